@@ -1,0 +1,156 @@
+"""Gaits a roboticist would try first, and small changes to a gait: the search's primal heuristics."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from wfbook.planner.kernel import MIRROR, Kernel, gait_key, mirror_symmetric
+from wfbook.planner.problem import Problem
+
+TROT = ((0, 3), (1, 2))
+CRAWL = ((2,), (0,), (3,), (1,))
+
+_EXACT = 3  # templates that are solved exactly
+_ROUNDS = 6  # of the local search
+
+Gait = tuple[np.ndarray, np.ndarray]
+
+
+def templates(problem: Problem) -> Iterator[Gait]:
+    """Yield swing matrices and wheel's dynamics matrices of common gaits.
+
+    Trots and crawls of every length, begun at once or a slot later, from either side; with wheels also
+    those in which some legs land on wheels at their first swing, and in which one of them puts a foot
+    down at the end.
+    """
+    L, J = problem.legs, problem.slots
+    last = J - 1 if problem.final_stance else J
+    cycles = [cycle[shift:] + cycle[:shift] for cycle in (TROT, CRAWL) for shift in range(len(cycle))]
+    feet = np.zeros((L, J), int)
+    yield feet, feet
+    for cycle in cycles:
+        for delay in range(min(2, last)):
+            for swings in range(1, last - delay + 1):
+                S = np.zeros((L, J), int)
+                for i in range(swings):
+                    S[list(cycle[i % len(cycle)]), delay + i] = 1
+                yield S, feet
+    if problem.wheels:
+        yield from _wheeled(problem, last)
+
+
+def _wheeled(problem: Problem, last: int) -> Iterator[Gait]:
+    """Yield trots in which a set of legs changes to wheels at the first swing and then rolls."""
+    L, J = problem.legs, problem.slots
+    for rolling in range(1, 2**L):
+        roll = [leg for leg in range(L) if rolling >> leg & 1]
+        for pairs in (TROT, TROT[::-1]):
+            for begin in range(min(2, last)):
+                for steps in range(min(last - begin, 8) + 1):
+                    S = np.zeros((L, J), int)
+                    wheel = np.zeros((L, J), int)
+                    for i in range(min(max(steps, 2), last - begin)):
+                        for leg in pairs[i % 2]:
+                            first = not S[leg].any()
+                            if (leg in roll and first) or (leg not in roll and i < steps):
+                                S[leg, begin + i] = 1
+                                if leg in roll:
+                                    wheel[leg, begin + i :] = 1
+                    if len(roll) == L and problem.final_stance:
+                        for leg in range(L):
+                            stop, braked = S.copy(), wheel.copy()
+                            stop[leg, last - 1], braked[leg, last - 1 :] = 1, 0
+                            yield stop, braked
+                    else:
+                        yield S, wheel
+
+
+def neighbours(problem: Problem, S: np.ndarray, wheel: np.ndarray) -> Iterator[Gait]:
+    """Yield gaits one small change away: drop, add or shift a swing, change what a leg lands on."""
+    L, J = S.shape
+    landed = [[(j, wheel[leg, j]) for j in np.flatnonzero(S[leg])] for leg in range(L)]
+    for leg in range(L):
+        for i, (j, kind) in enumerate(landed[leg]):
+            rest = landed[leg][:i] + landed[leg][i + 1 :]
+            yield _with(problem, S, wheel, leg, rest)
+            for other in (j - 1, j + 1):
+                if 0 <= other < J and other not in [s for s, _ in rest]:
+                    yield _with(problem, S, wheel, leg, sorted([*rest, (other, kind)]))
+            if problem.wheels:
+                yield _with(problem, S, wheel, leg, sorted([*rest, (j, 1 - kind)]))
+        for j in range(J):
+            if not S[leg, j]:
+                for kind in range(1 + problem.wheels):
+                    yield _with(problem, S, wheel, leg, sorted([*landed[leg], (j, kind)]))
+    for pair in ((0, 3), (1, 2)):
+        for j in range(J):
+            if S[pair[0], j] and S[pair[1], j]:
+                dropped, kinds = S, wheel
+                for leg in pair:
+                    rest = [s for s in landed[leg] if s[0] != j]
+                    dropped, kinds = _with(problem, dropped, kinds, leg, rest)
+                yield dropped, kinds
+
+
+def _with(problem: Problem, S: np.ndarray, wheel: np.ndarray, leg: int, landings: list) -> Gait:
+    """Return the gait with one leg's swings replaced by ``(slot, end effector)`` pairs."""
+    S, wheel = S.copy(), wheel.copy()
+    S[leg] = 0
+    wheel[leg] = problem.start_end_effectors[leg] == "wheel"
+    for j, kind in landings:
+        S[leg, j] = 1
+        wheel[leg, j:] = kind
+    return S, wheel
+
+
+def mirrored(gait: Gait) -> Gait:
+    """Return a gait with left and right exchanged."""
+    return gait[0][list(MIRROR)], gait[1][list(MIRROR)]
+
+
+def improve(kernel: Kernel) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
+    """Yield ever better gaits: templates ranked by the QP, the best solved exactly, then changed bit by bit.
+
+    Args:
+        kernel: bounds and leaves of the problem.
+
+    Yields:
+        Cost, swing matrix and wheel's dynamics matrix, each better than the one before.
+    """
+    problem, seen = kernel.problem, set()
+    symmetric = mirror_symmetric(problem)
+
+    def score(gait: Gait) -> float:
+        image = mirrored(gait)
+        key = gait_key(*gait)
+        if key in seen or (symmetric and gait_key(*image) in seen) or not kernel.admissible(*gait):
+            return np.inf
+        seen.add(key)
+        return kernel.gait_bound(*gait)
+
+    ranked = [(score(gait), i, gait) for i, gait in enumerate(templates(problem))]
+    ranked = sorted((r for r in ranked if np.isfinite(r[0])), key=lambda r: r[:2])
+    best, current = np.inf, None
+    for bound, _, gait in ranked[:_EXACT]:
+        if bound < best:
+            value = kernel.leaf(*gait).value
+            if value < best:
+                best, current = value, gait
+                yield best, *gait
+    for _ in range(_ROUNDS):
+        if current is None:
+            return
+        ranked = sorted(
+            ((score(gait), i, gait) for i, gait in enumerate(neighbours(problem, *current))), key=lambda r: r[:2]
+        )
+        improved = False
+        for bound, _, gait in ranked:
+            if bound >= best:
+                break
+            value = kernel.leaf(*gait).value
+            if value < best:
+                best, current, improved = value, gait, True
+                yield best, *gait
+                break
+        if not improved:
+            return

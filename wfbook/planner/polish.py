@@ -1,0 +1,194 @@
+"""From the relaxed plan to one that can be executed: the same contacts, with true torque.
+
+The relaxation of eq. 9 lets the program buy torque that no contact makes, and it does: plans straight
+from it fall. With the binaries fixed, the only non-convexity left is the product of lever and force.
+It is linearised about the last plan, inside a trust region; a few small QPs bring the true torque of
+eq. 8 into agreement with the rotation. What comes out adds the sideways sway that the relaxed plan
+did without.
+"""
+
+from dataclasses import replace
+
+import cvxpy as cp
+import numpy as np
+from scipy import sparse
+
+from wfbook.centroidal import contact_torque
+from wfbook.planner import tight
+from wfbook.planner.conic import Conic
+from wfbook.planner.extract import fill, plan_of, problem_of, read
+from wfbook.planner.plan import Plan
+from wfbook.planner.presolve import solve_fixed
+from wfbook.planner.problem import Problem
+from wfbook.planner.program import motion_cost
+
+ANGLE_WEIGHTS = {"goal_angle": 100.0, "angle": 20.0, "angular_rate": 1.0}
+"""Weights of rotation while polishing: the true torque is to be spent on staying level."""
+
+PRICE = 20.0
+"""Of a body weight times a metre of torque that no contact makes, for each interval and axis."""
+
+TOLERANCE_NM = 1e-3
+"""The largest true torque mismatch at which the iteration ends."""
+
+ACCEPTED_NM = 0.1
+"""The largest rms torque mismatch per axis of a plan that counts as repaired."""
+
+_ITERATIONS = 20
+
+
+class Polisher:
+    """The QP of the polish for one problem, compiled once and used for any of its gaits."""
+
+    def __init__(self, problem: Problem):
+        """Compile the tight program without eq. 9, with levers, forces and slack as variables."""
+        self.problem = replace(problem, weights=replace(problem.weights, **ANGLE_WEIGHTS))
+        self.program = program = tight.build(self.problem)
+        shape = (problem.knots, problem.legs)
+        self._lever = [cp.Variable(shape) for _ in range(3)]
+        self._force = [cp.Variable(shape) for _ in range(3)]
+        self._slack = [cp.Variable(problem.knots) for _ in range(3)]
+        ties = [v == e for v, e in zip(self._lever, program.lever, strict=True)]
+        ties += [v == e for v, e in zip(self._force, program.force, strict=True)]
+        squares = sum(cp.sum_squares(z) for z in (*self._lever, *self._force))
+        cost = motion_cost(program) + 4 * problem.weights.bounds * squares
+        cost += PRICE * sum(cp.norm1(s) for s in self._slack)
+        self._conic = Conic.compile(cost, program.rows(without=("torque", "torque bounds")) + ties)
+        self._program_columns = {key: self._conic.columns(v) for key, v in program.discrete.items()}
+
+    def polish(self, plan: Plan) -> Plan:
+        """Return the plan with the same binaries and true torque.
+
+        Args:
+            plan: a relaxed plan of this problem.
+
+        Returns:
+            The polished plan. ``meta["torque_mismatch_nm"]`` holds the rms per axis of what is left,
+            ``meta["relaxed_torque_mismatch_nm"]`` that of the relaxed plan; :func:`repaired` judges.
+        """
+        problem, weight, conic = self.problem, self.problem.robot.weight, self._conic
+        S, wheel = plan.S.astype(float), plan.end_effector.astype(float)
+        known = tight.assignment(problem, S, wheel)
+        columns = np.concatenate([self._program_columns[key].ravel() for key in self.program.discrete])
+        fixed = np.concatenate([known[key].ravel() for key in self.program.discrete])
+        lever, force = _middle_levers(plan), [plan.lam[..., i] / weight for i in range(3)]
+        radius, best, merit, steps = np.array([0.05, 0.25]), None, np.inf, 0
+        for steps in range(1, _ITERATIONS + 1):
+            found = solve_fixed(self._linearised(lever, force, radius), columns, fixed)
+            if found.status != "solved":
+                # The relaxed plan may lie outside the polish's rows by a solver's tolerance.
+                if best is not None or radius[0] > 0.4:
+                    break
+                radius = radius * 2
+                continue
+            new_lever = [conic.value(v, found.y) for v in self._lever]
+            new_force = [conic.value(v, found.y) for v in self._force]
+            mismatch = self._mismatch(new_lever, new_force, found.y)
+            slack = sum(np.abs(conic.value(s, found.y)).sum() for s in self._slack)
+            value = found.value + PRICE * (np.abs(mismatch).sum() - slack)
+            if value < merit - 1e-9 or best is None:
+                progress = merit - value
+                lever, force, merit, best = new_lever, new_force, value, found.y
+                radius = radius * 1.5
+                if weight * np.abs(mismatch).max() < TOLERANCE_NM and progress < 1e-4 * abs(merit):
+                    break
+            else:
+                radius = radius * 0.3
+                if radius[0] < 1e-4:
+                    break
+        if best is None:
+            return plan.with_meta(stage="polished", status="polish failed", torque_mismatch_nm=[np.inf] * 3)
+        return self._plan(plan, best, steps)
+
+    def _linearised(self, lever: list[np.ndarray], force: list[np.ndarray], radius: np.ndarray) -> Conic:
+        """Return the QP with eq. 8 linearised about a plan, inside a trust region."""
+        conic, problem = self._conic, self.problem
+        n, K = conic.A.shape[1], problem.knots
+        inertia = problem.robot.inertia / problem.robot.weight
+        r, F, s, alpha = (
+            [conic.columns(v) for v in group]
+            for group in (self._lever, self._force, self._slack, self.program.alpha)
+        )
+        rows, columns, entries, right = [], [], [], []
+        knots = np.arange(K)
+
+        def put(axis: int, where: np.ndarray, what: np.ndarray) -> None:
+            at = np.broadcast_to((axis * K + knots)[:, None] if where.ndim == 2 else axis * K + knots, where.shape)
+            rows.append(at.ravel()), columns.append(where.ravel()), entries.append(np.broadcast_to(what, where.shape).ravel())
+
+        for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            for axis in range(3):
+                put(i, alpha[axis], inertia[i, axis])
+            put(i, s[i], -1.0)
+            put(i, F[k], -lever[j]), put(i, r[j], -force[k])
+            put(i, F[j], lever[k]), put(i, r[k], force[j])
+            right.append((lever[k] * force[j] - lever[j] * force[k]).sum(axis=1))
+        equal = sparse.csc_matrix(
+            (np.concatenate(entries), (np.concatenate(rows), np.concatenate(columns))), shape=(3 * K, n)
+        )
+        boxed = np.concatenate([c.ravel() for c in (*r, *F)])
+        centre = np.concatenate([c.ravel() for c in (*lever, *force)])
+        size = np.repeat(radius, len(boxed) // 2)
+        pick = sparse.csc_matrix((np.ones(len(boxed)), (np.arange(len(boxed)), boxed)), shape=(len(boxed), n))
+        below, limit = sparse.vstack([pick, -pick]), np.concatenate([centre + size, size - centre])
+        return conic.with_rows(equal, np.concatenate(right), below, limit)
+
+    def _mismatch(self, lever: list[np.ndarray], force: list[np.ndarray], y: np.ndarray) -> np.ndarray:
+        """Return rotation minus true torque (eq. 8), in body weights times metres, ``(3, K)``."""
+        problem = self.problem
+        alpha = np.array([self._conic.value(a, y) for a in self.program.alpha])
+        torque = np.array([tau.sum(axis=1) for tau in contact_torque(lever, force)])
+        return problem.robot.inertia @ alpha / problem.robot.weight - torque
+
+    def _plan(self, plan: Plan, y: np.ndarray, steps: int) -> Plan:
+        fill(self.program, self._conic, y)
+        values = read(self.program, bounds=False)
+        meta = plan.meta | {"stage": "polished", "polish_iterations": steps}
+        # The weights of the record are those of the program that chose the gait.
+        problem = replace(self.problem, weights=problem_of(plan).weights)
+        polished = plan_of(problem, values, plan.S.astype(float), plan.end_effector.astype(float), meta)
+        return polished.with_meta(
+            torque_mismatch_nm=torque_mismatch(polished).tolist(),
+            relaxed_torque_mismatch_nm=torque_mismatch(plan).tolist(),
+        )
+
+
+def polish(plan: Plan) -> Plan:
+    """Make a relaxed plan executable: binaries fixed, true torque (see :class:`Polisher`).
+
+    Args:
+        plan: what :func:`wfbook.planner.solve` returned.
+
+    Returns:
+        The polished plan; objective, bound and gap are those of the relaxed one.
+
+    Raises:
+        ValueError: the plan's ``meta`` does not describe its problem.
+    """
+    return Polisher(problem_of(plan)).polish(plan)
+
+
+def torque_mismatch(plan: Plan) -> np.ndarray:
+    """Return the rms over time of rotation minus true torque, each axis, in N m (eq. 8).
+
+    Args:
+        plan: relaxed or polished; levers are taken at mid-interval.
+
+    Returns:
+        ``(3,)``.
+    """
+    force = [plan.lam[..., i] for i in range(3)]
+    torque = np.stack([tau.sum(axis=1) for tau in contact_torque(_middle_levers(plan), force)], axis=-1)
+    inertia = np.array(plan.meta["inertia"])
+    return np.sqrt(np.mean((plan.alpha @ inertia.T - torque) ** 2, axis=0))
+
+
+def repaired(plan: Plan) -> bool:
+    """Tell whether a polished plan's torque is true to 0.1 N m rms on every axis."""
+    return bool(np.max(plan.meta["torque_mismatch_nm"]) <= ACCEPTED_NM)
+
+
+def _middle_levers(plan: Plan) -> list[np.ndarray]:
+    lever = plan.p - plan.x[:, None, :]
+    middle = 0.5 * (lever[1:] + lever[:-1])
+    return [middle[..., i] for i in range(3)]

@@ -1,0 +1,179 @@
+"""What is asked of the planner: terrain, goal, time, end effectors, weights and limits."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from wfbook.centroidal import Robot
+from wfbook.modes import DIAGONAL_PATTERNS, END_EFFECTORS, LEGS
+from wfbook.terrain import Region, Terrain
+
+
+@dataclass(frozen=True)
+class Weights:
+    """The weights of the cost (Paper A, eqs 31–33); the paper does not give its own.
+
+    With forces in body weights, ``F = λ / (m g)``, and lengths in metres, the cost is
+    ``goal ‖x_K − x_d‖² + goal_angle ‖θ_K‖²
+    + Σ_{k≥1} (angle ‖θ_k‖² + angular_rate ‖ω_k‖² + height (x_k,z − h)²)
+    + Σ_k (acceleration ‖a_k‖² + force Σ_l ‖F_kl‖² + bounds Σ_l,i (U⁺ + U⁻)_kli / (m g)
+    + centroid ‖x_{k+1} − c_k‖²) + swing Σ_lj (j + 1) S_lj`` with ``j`` from 0. The goal's and the
+    centroid's norms are horizontal. The terms in angle, angular rate and height are not in the
+    paper: without them rotation rings at ± 6 rad/s and the levers in U make the robot crouch.
+    """
+
+    goal: float = 10.0
+    goal_angle: float = 10.0
+    acceleration: float = 0.005
+    force: float = 0.03
+    bounds: float = 0.005
+    centroid: float = 1.0
+    swing: float = 0.02
+    height: float = 20.0
+    angle: float = 1.0
+    angular_rate: float = 0.05
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of motion and force that the paper leaves open.
+
+    Attributes:
+        speed: of the centre of mass along x; forward and backward.
+        lateral_speed: likewise along y and z.
+        step: longest displacement of an end effector in one swing, along x and y.
+        force: normal force of one leg, in body weights.
+        angle: of the body, each axis, in radians.
+        rest_offset: how far each contact may be from its nominal place at the end, x and y. A wider
+            stance leaves the centre of mass near an edge, where a small push topples it.
+    """
+
+    speed: tuple[float, float] = (0.8, 0.1)
+    lateral_speed: float = 0.3
+    step: tuple[float, float] = (0.30, 0.15)
+    force: float = 0.75
+    angle: float = 0.3
+    rest_offset: tuple[float, float] = (0.12, 0.06)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A planning problem (Paper A, section II).
+
+    Attributes:
+        terrain: one level region in this version.
+        goal: ``(x, y)`` where the centre of mass should be at the end; a cost, not a constraint.
+        slots: number of slots ``N_j``; in each, a leg either swings or stands.
+        slot_duration: of one slot, in seconds.
+        knots_per_slot: the paper's ρ.
+        end_effectors: what a leg may carry: ``("foot",)`` or ``("foot", "wheel")``.
+        start: ``(x, y)`` of the centre of mass at time 0, at rest.
+        start_offsets: ``(L, 2)`` displacement of each contact from its nominal place at time 0.
+        start_end_effectors: what each leg carries before slot 0; default feet.
+        patterns: sets of legs that may swing together.
+        stance_between_swings: a leg that landed must stand for a slot before it swings again.
+        final_stance: all legs stand in the last slot, at rest, one of them on a foot.
+        beyond_reach: accept a goal farther than top speed can bring the robot (section IV-B does).
+        robot: mass, inertia and reach boxes.
+        weights: of the cost.
+        limits: of motion and force.
+
+    Raises:
+        ValueError: a field is wrong; the message names it and its value.
+    """
+
+    terrain: Terrain
+    goal: tuple[float, float] = (1.0, 0.0)
+    slots: int = 10
+    slot_duration: float = 0.3
+    knots_per_slot: int = 3
+    end_effectors: Sequence[str] = END_EFFECTORS
+    start: tuple[float, float] = (0.0, 0.0)
+    start_offsets: np.ndarray = field(default_factory=lambda: np.zeros((len(LEGS), 2)))
+    start_end_effectors: Sequence[str] = ("foot",) * len(LEGS)
+    patterns: Sequence[tuple[int, ...]] = DIAGONAL_PATTERNS
+    stance_between_swings: bool = True
+    final_stance: bool = True
+    beyond_reach: bool = False
+    robot: Robot = field(default_factory=Robot.go1)
+    weights: Weights = field(default_factory=Weights)
+    limits: Limits = field(default_factory=Limits)
+
+    def __post_init__(self):
+        for name in ("slots", "knots_per_slot"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < 1:
+                raise ValueError(f"{name}: {value!r} is not a whole number of at least 1")
+        if not (np.isfinite(self.slot_duration) and self.slot_duration > 0):
+            raise ValueError(f"slot_duration: {self.slot_duration!r} is not a positive number of seconds")
+        for name in ("goal", "start"):
+            value = getattr(self, name)
+            if np.shape(value) != (2,) or not np.isfinite(np.asarray(value, float)).all():
+                raise ValueError(f"{name}: {value!r} is not a pair of finite numbers")
+        if np.shape(self.start_offsets) != (len(LEGS), 2) or not np.isfinite(self.start_offsets).all():
+            raise ValueError(f"start_offsets: not a finite array of shape {(len(LEGS), 2)}")
+        if "foot" not in self.end_effectors or not set(self.end_effectors) <= set(END_EFFECTORS):
+            raise ValueError(f"end_effectors: {self.end_effectors!r}, expected ('foot',) or ('foot', 'wheel')")
+        if len(self.start_end_effectors) != len(LEGS) or not set(self.start_end_effectors) <= set(self.end_effectors):
+            raise ValueError(f"start_end_effectors: {self.start_end_effectors!r}, one of {self.end_effectors!r} a leg")
+        if any(() not in self.patterns or not set(p) <= set(range(len(LEGS))) for p in self.patterns):
+            raise ValueError(f"patterns: {self.patterns!r}, expected sets of legs 0 to 3, the empty one among them")
+        self._check_terrain()
+
+    def _check_terrain(self):
+        """Refuse terrain this version can't plan on, and goals outside of it."""
+        regions = self.terrain.regions
+        if len(regions) != 1 or abs(regions[0].normal[2] - 1.0) > 1e-9:
+            raise ValueError(f"terrain: {self.terrain.name!r} is not one level region, which is all this version plans on")
+        for name in ("start", "goal"):
+            place = getattr(self, name)
+            if self.terrain.region_at(*place) is None:
+                raise ValueError(f"{name}: {tuple(place)} lies outside the terrain {self.terrain.name!r}")
+        distance = float(np.hypot(*np.subtract(self.goal, self.start)))
+        furthest = self.limits.speed[0] * self.duration
+        if distance > furthest and not self.beyond_reach:
+            raise ValueError(
+                f"goal: {tuple(self.goal)} is out of reach: {distance:.2f} m away, "
+                f"{furthest:.2f} m at {self.limits.speed[0]} m/s in {self.slots} slots of {self.slot_duration} s"
+            )
+
+    @property
+    def region(self) -> Region:
+        """The region everything stands on."""
+        return self.terrain.regions[0]
+
+    @property
+    def legs(self) -> int:
+        """Number of legs ``L``."""
+        return len(LEGS)
+
+    @property
+    def knots(self) -> int:
+        """Number of intervals ``K``."""
+        return self.slots * self.knots_per_slot
+
+    @property
+    def dt(self) -> float:
+        """Time between knots."""
+        return self.slot_duration / self.knots_per_slot
+
+    @property
+    def duration(self) -> float:
+        """Duration of the plan."""
+        return self.slots * self.slot_duration
+
+    @property
+    def wheels(self) -> bool:
+        """Whether a leg may carry a wheel."""
+        return "wheel" in self.end_effectors
+
+    @property
+    def ground(self) -> float:
+        """Height of the level region."""
+        return float(self.region.height(*self.start))
+
+    @property
+    def start_contacts(self) -> np.ndarray:
+        """``(L, 2)`` contact points at time 0."""
+        return np.asarray(self.start, float) + self.robot.stance + self.start_offsets

@@ -1,0 +1,197 @@
+"""The mixed-integer program's common part: variables, cost, dynamics and reach (Paper A, eqs 1–9, 30–33).
+
+Forces are in body weights, ``F = λ / (m g)``, so that levers and forces are numbers of one size;
+components come first, ``force[i]`` of shape ``(K, L)``. The two formulations (:mod:`.tight` and
+:mod:`.paper`) add what ties the binaries to this.
+"""
+
+from dataclasses import dataclass, field
+from collections.abc import Sequence
+from typing import Any
+
+import cvxpy as cp
+import numpy as np
+
+from wfbook.centroidal import GRAVITY, bound_terms, linear_dynamics, midpoint_integration
+from wfbook.planner.problem import Problem
+from wfbook.swing import quintic_basis, septic_basis
+
+
+@dataclass
+class Program:
+    """A formulation as CVXPY sees it.
+
+    Attributes:
+        problem: what is asked.
+        x, v, a, theta, omega, alpha: components of shape ``(K+1,)`` or ``(K,)``.
+        p: contact points, components of shape ``(K+1, L)``.
+        force: contact forces in body weights, components of shape ``(K, L)``.
+        friction: rolling friction in body weights, components of shape ``(K, L)``.
+        U_plus, U_minus: bounds of eq. 9 summed over legs, in body weights, components ``(K,)``.
+        centroid: ``c − x`` at knot ``k + 1``, components x and y of shape ``(K,)``.
+        S: swing matrix, ``(L, J)`` expression.
+        wheel: dynamics matrix of the wheel, ``D[:, :, 0, 1]``, ``(L, J)`` expression.
+        constraints: by the name of their group.
+        cost: eq. 31.
+        lever: ``p − x`` at mid-interval, components of shape ``(K, L)``.
+        discrete: the variables that must be integers, by name.
+    """
+
+    problem: Problem
+    x: list[Any]
+    v: list[Any]
+    a: list[Any]
+    theta: list[Any]
+    omega: list[Any]
+    alpha: list[Any]
+    p: list[Any]
+    force: list[Any]
+    friction: list[Any]
+    U_plus: list[Any]
+    U_minus: list[Any]
+    centroid: list[Any]
+    S: Any
+    wheel: Any
+    constraints: dict[str, list[Any]]
+    cost: Any = None
+    lever: list[Any] = field(default_factory=list)
+    discrete: dict[Any, Any] = field(default_factory=dict)
+
+    def add(self, group: str, *constraints: Any) -> None:
+        """Add constraints to a group."""
+        self.constraints.setdefault(group, []).extend(constraints)
+
+    def rows(self, without: Sequence[str] = ()) -> list[Any]:
+        """Return the constraints of all groups but some."""
+        return [c for name, group in self.constraints.items() if name not in without for c in group]
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Constant matrices between slots and knots.
+
+    Attributes:
+        spread: ``(K, J)``: what holds for a slot, for each of its intervals.
+        begin: ``(K, K+1)`` picks, for knot ``k + 1``, the first knot of its slot.
+        step: ``(K, J)`` weight of a slot's step in the foot's place at knot ``k + 1`` (eq. 6).
+        lift: ``(K, J)`` weight of the velocity at lift-off.
+        land: ``(K, J)`` weight of the velocity at touch-down.
+        apex: ``(K+1, J)`` height of a swing of unit apex.
+        age: ``(K,)`` intervals since the slot began, at knot ``k + 1``.
+    """
+
+    spread: np.ndarray
+    begin: np.ndarray
+    step: np.ndarray
+    lift: np.ndarray
+    land: np.ndarray
+    apex: np.ndarray
+    age: np.ndarray
+
+    @classmethod
+    def of(cls, problem: Problem) -> "Grid":
+        """Return the matrices for a problem's slots and knots."""
+        J, rho, K, T = problem.slots, problem.knots_per_slot, problem.knots, problem.slot_duration
+        age = np.tile(np.arange(1, rho + 1), J)
+        basis = quintic_basis(np.arange(1, rho + 1) / rho)
+        spread = np.kron(np.eye(J), np.ones((rho, 1)))
+        begin = np.zeros((K, K + 1))
+        begin[np.arange(K), rho * (np.arange(K) // rho)] = 1.0
+        apex = np.vstack([np.zeros(J), np.kron(np.eye(J), septic_basis(np.arange(1, rho + 1) / rho)[:, 2:])])
+        columns = [np.kron(np.eye(J), basis[:, [i]]) for i in (2, 1, 3)]
+        return cls(spread, begin, columns[0], T * columns[1], T * columns[2], apex, age)
+
+
+def common(problem: Problem, S: Any, wheel: Any, force: list[Any], friction: list[Any], per_leg: bool) -> Program:
+    """State what both formulations share: dynamics, torque bounds, reach, start, end and cost.
+
+    Args:
+        problem: what is asked.
+        S: swing matrix, ``(L, J)`` variable or expression.
+        wheel: the wheel's dynamics matrix, likewise.
+        force: contact forces in body weights, components ``(K, L)``.
+        friction: rolling friction in body weights, components ``(K, L)``.
+        per_leg: give each leg its own bounds U± as the paper does. Only their sums over legs enter
+            cost and dynamics, so one cone for all legs is the same program with a quarter of the cones.
+
+    Returns:
+        A program without what ties ``S`` and ``wheel`` to motion and force.
+    """
+    K, L = problem.knots, problem.legs
+    vector = [[cp.Variable(n, name=f"{name}{i}") for i in range(3)] for name, n in _vectors(K)]
+    x, v, a, theta, omega, alpha = vector
+    p = [cp.Variable((K + 1, L), name=f"p{i}") for i in range(3)]
+    bounds = [[cp.Variable((K, L) if per_leg else K, name=f"U{sign}{i}") for i in range(3)] for sign in "+-"]
+    total = [[cp.sum(u, axis=1) if per_leg else u for u in side] for side in bounds]
+    centroid = [cp.Variable(K, name=f"c{i}") for i in range(2)]
+    program = Program(
+        problem, x, v, a, theta, omega, alpha, p, force, friction, *total, centroid, S, wheel, constraints={}
+    )
+    dt = problem.dt
+
+    newton = linear_dynamics(a, force, friction, mass=1.0 / GRAVITY)
+    program.add("dynamics", *(r == 0 for r in newton + midpoint_integration(x, v, a, dt)))
+    inertia = problem.robot.inertia / problem.robot.weight
+    for i in range(3):
+        torque = sum(inertia[i, j] * alpha[j] for j in range(3) if inertia[i, j])
+        program.add("torque", torque == 0.25 * (total[0][i] - total[1][i]))
+    program.add("rotation", *(r == 0 for r in midpoint_integration(theta, omega, alpha, dt)))
+
+    lever = [p[i] - cp.reshape(x[i], (K + 1, 1), order="C") @ np.ones((1, L)) for i in range(3)]
+    middle = program.lever = [0.5 * (r[1:] + r[:-1]) for r in lever]
+    for side, terms in zip(bounds, bound_terms(middle, force), strict=True):
+        for u, pair in zip(side, terms, strict=True):
+            program.add("torque bounds", *_above_squares(u, pair, per_leg))
+
+    robot, limits = problem.robot, problem.limits
+    ones = np.ones((K + 1, 1))
+    for i in range(3):
+        program.add("reach", lever[i] >= ones * robot.reach_lower[:, i], lever[i] <= ones * robot.reach_upper[:, i])
+    height = problem.ground + robot.height
+    program.add("reach", cp.abs(x[2] - height) <= robot.reach[2])
+    program.add("speed", v[0] <= limits.speed[0], v[0] >= -limits.speed[1])
+    program.add("speed", *(cp.abs(v[i]) <= limits.lateral_speed for i in (1, 2)))
+    program.add("speed", *(cp.abs(angle) <= limits.angle for angle in theta))
+
+    place = (*problem.start, height)
+    program.add("start", *(x[i][0] == place[i] for i in range(3)), *(p[i][0] == problem.start_contacts[:, i] for i in (0, 1)))
+    program.add("start", *(z[0] == 0 for z in (*v, *theta, *omega)))
+    if problem.final_stance:
+        program.add("end", *(z[K] == 0 for z in (*v, *omega)), S[:, -1] == 0)
+        nominal = robot.stance
+        program.add("end", *(cp.abs(lever[i][K] - nominal[:, i]) <= limits.rest_offset[i] for i in (0, 1)))
+    program.cost = motion_cost(program) + problem.weights.bounds * sum(cp.sum(U) for U in (*total[0], *total[1]))
+    return program
+
+
+def _vectors(K: int) -> list[tuple[str, int]]:
+    """Name the vectors over knots and their lengths."""
+    return [("x", K + 1), ("v", K + 1), ("a", K), ("theta", K + 1), ("omega", K + 1), ("alpha", K)]
+
+
+def _above_squares(u: Any, pair: tuple[Any, Any], per_leg: bool) -> list[Any]:
+    """State ``u ≥ Σ pair²`` as second-order cones (eq. 9): ``‖(2 z, u − 1)‖ ≤ u + 1``."""
+    if per_leg:
+        flat = [cp.vec(z, order="C") for z in (2 * pair[0], 2 * pair[1], u - 1)]
+        return [cp.SOC(cp.vec(u, order="C") + 1, cp.vstack(flat), axis=0)]
+    K = u.shape[0]
+    return [cp.SOC(u + 1, cp.hstack([2 * pair[0], 2 * pair[1], cp.reshape(u - 1, (K, 1), order="C")]).T, axis=0)]
+
+
+def motion_cost(program: Program) -> Any:
+    """State eqs 31–33 but for the bounds U± (see :class:`~.problem.Weights`)."""
+    w, problem, K = program.problem.weights, program.problem, program.problem.knots
+    height = problem.ground + problem.robot.height
+    goal = cp.hstack([program.x[i][K] - problem.goal[i] for i in range(2)])
+    terms = [
+        w.goal * cp.sum_squares(goal),
+        w.goal_angle * sum(cp.square(angle[K]) for angle in program.theta),
+        w.acceleration * sum(cp.sum_squares(a) for a in program.a),
+        w.force * sum(cp.sum_squares(F) for F in program.force),
+        w.centroid * sum(cp.sum_squares(c) for c in program.centroid),
+        w.height * cp.sum_squares(program.x[2][1:] - height),
+        w.angle * sum(cp.sum_squares(angle[1:]) for angle in program.theta),
+        w.angular_rate * sum(cp.sum_squares(rate[1:]) for rate in program.omega),
+        w.swing * cp.sum(program.S @ np.arange(1, problem.slots + 1)),
+    ]
+    return sum(terms)

@@ -1,0 +1,157 @@
+"""Solve a planning problem: formulation, search, plan; then the gait that can also be executed."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from wfbook.planner import bigm
+from wfbook.planner.explain import InfeasibleError, NoPlanError, conflicting_groups
+from wfbook.planner.extract import fill, plan_of, read
+from wfbook.planner.kernel import Kernel, gait_key
+from wfbook.planner.plan import Plan
+from wfbook.planner.polish import Polisher, repaired
+from wfbook.planner.problem import Problem
+from wfbook.planner.tree import Progress, Tree
+
+FORMULATIONS = ("tight", "paper")
+
+
+def solve(
+    problem: Problem,
+    formulation: str = "tight",
+    gap: float = 1e-3,
+    time_limit: float = 60.0,
+    progress: Callable[[Progress], None] | None = None,
+) -> Plan:
+    """Solve the mixed-integer program (Paper A, eqs 1–33).
+
+    Args:
+        problem: what is asked.
+        formulation: "tight", searched by SCIP with conic bounds from Clarabel; or "paper", the paper's
+            big-M program given to SCIP as it is. Both have the same feasible set.
+        gap: relative gap ``(objective − bound) / objective`` at which the search ends.
+        time_limit: of the search, in seconds.
+        progress: called now and then while the tight formulation is searched.
+
+    Returns:
+        The relaxed plan. ``meta`` holds objective, bound, gap, nodes, status ("optimal", "time limit"
+        or "interrupted"), solve_time and build_time in seconds. A time limit or an interrupt returns
+        the incumbent and what was proven.
+
+    Raises:
+        ValueError: an argument is wrong.
+        InfeasibleError: there is no plan; it names the constraints that exclude each other.
+        NoPlanError: the time limit came before the first plan.
+        KeyboardInterrupt: the interrupt came before the first plan.
+    """
+    if formulation not in FORMULATIONS:
+        raise ValueError(f"formulation: {formulation!r}, expected one of {FORMULATIONS}")
+    _check_limits(gap, time_limit)
+    if formulation == "paper":
+        return bigm.solve(problem, gap, time_limit)
+    return Search(problem, gap, time_limit, progress).run()
+
+
+def solve_executable(
+    problem: Problem,
+    formulation: str = "tight",
+    gap: float = 1e-3,
+    time_limit: float = 60.0,
+    progress: Callable[[Progress], None] | None = None,
+) -> tuple[Plan, Plan]:
+    """Solve, polish, and search on while the best gait can't be polished.
+
+    Args:
+        problem, formulation, gap, time_limit, progress: as for :func:`solve`.
+
+    Returns:
+        The relaxed plan and its polish. ``meta["rejected_gaits"]`` says how many gaits were cut off
+        because no true torque could execute them; bound and gap are those of the gaits that remain.
+
+    Raises:
+        NoPlanError: the time limit came before a plan that can be polished.
+        Others as for :func:`solve`.
+    """
+    _check_limits(gap, time_limit)
+    polisher = Polisher(problem)
+    if formulation == "paper":
+        relaxed = solve(problem, formulation, gap, time_limit)
+        polished = polisher.polish(relaxed)
+        if not repaired(polished):
+            raise NoPlanError("the paper formulation's gait can't be polished; formulation='tight' searches on")
+        return relaxed, polished
+    search = Search(problem, gap, time_limit, progress)
+    while True:
+        relaxed = search.run()
+        polished = polisher.polish(relaxed)
+        if repaired(polished):
+            return relaxed, polished
+        if relaxed.meta["status"] != "optimal":
+            raise NoPlanError(f"{relaxed.meta['status']} before a gait was found that can be polished")
+        search.exclude(relaxed)
+
+
+def _check_limits(gap: float, time_limit: float) -> None:
+    if not (np.isfinite(gap) and gap > 0):
+        raise ValueError(f"gap: {gap!r} is not a positive number")
+    if not (np.isfinite(time_limit) and time_limit > 0):
+        raise ValueError(f"time_limit: {time_limit!r} is not a positive number of seconds")
+
+
+class Search:
+    """A search that can go on after a gait is excluded: bounds and leaves are remembered."""
+
+    def __init__(
+        self, problem: Problem, gap: float, time_limit: float, progress: Callable[[Progress], None] | None = None
+    ):
+        """Build and compile both programs.
+
+        Args:
+            problem, gap, time_limit, progress: as for :func:`solve`.
+        """
+        begin = time.perf_counter()
+        self.problem, self.gap, self.progress = problem, gap, progress
+        self.kernel = Kernel(problem)
+        self.build_time = time.perf_counter() - begin
+        self._left = time_limit
+        self._spent, self._nodes = 0.0, 0
+
+    def exclude(self, plan: Plan) -> None:
+        """Cut a plan's gait off."""
+        self.kernel.excluded.add(gait_key(plan.S, plan.end_effector))
+
+    def run(self) -> Plan:
+        """Search with the time that is left (see :func:`solve`)."""
+        kernel = self.kernel
+        kernel.pruned = np.inf
+        tree = Tree(kernel, self.gap, self._left, self.progress)
+        status, bound, nodes = tree.run()
+        self._left = max(self._left - tree.elapsed, 1e-3)
+        self._spent, self._nodes = self._spent + tree.elapsed, self._nodes + nodes
+        if status == "infeasible":
+            raise InfeasibleError(conflicting_groups(self.problem), len(kernel.excluded))
+        if tree.best is None:
+            if status == "interrupted":
+                raise KeyboardInterrupt
+            raise NoPlanError(f"no plan found within {self._spent:.1f} s")
+        cost, S, wheel = tree.best
+        found = kernel.leaf(S, wheel)
+        fill(kernel.program, kernel.conic, found.y)
+        meta = {
+            "stage": "relaxed",
+            "formulation": "tight",
+            "objective": cost,
+            "bound": bound,
+            "gap": max(cost - bound, 0.0) / cost,
+            "gap_target": self.gap,
+            "status": status,
+            "nodes": self._nodes,
+            "root_bound": tree.root_bound,
+            "relaxations": kernel.qps,
+            "leaves": kernel.leaves,
+            "rejected_gaits": len(kernel.excluded),
+            "solve_time": self._spent,
+            "build_time": self.build_time,
+        }
+        return plan_of(self.problem, read(kernel.program), S, wheel, meta)
