@@ -14,8 +14,9 @@ class Solution:
     """What Clarabel found.
 
     Attributes:
-        status: "solved", "infeasible" or "failed" (no answer to be trusted).
-        value: the primal objective; infinite if infeasible, NaN if failed.
+        status: "solved", "cut" (stopped when the bound had passed a cutoff), "infeasible" or "failed"
+            (no answer to be trusted).
+        value: the primal objective; infinite if infeasible, NaN if cut or failed.
         bound: a lower bound of the optimum: the lesser of primal and dual objective; ``-inf`` if failed.
         y: the compiled program's variables.
     """
@@ -103,11 +104,13 @@ class Conic:
         """
         data, _, _ = cp.Problem(cp.Minimize(cost), constraints).get_problem_data(cp.CLARABEL)
         n, dims = len(data["c"]), data["dims"]
-        P = sparse.triu(data["P"]).tocsc() if data.get("P") is not None else sparse.csc_matrix((n, n))
+        quadratic = data.get("P") is not None
+        P = sparse.triu(data["P"]).tocsc() if quadratic else sparse.csc_matrix((n, n))
+        applied = data["param_prob"].apply_parameters(quad_obj=quadratic)
         return cls(
             P=P,
             q=data["c"],
-            offset=float(data["param_prob"].apply_parameters(quad_obj=True)[2]),
+            offset=float(applied[2] if quadratic else applied[1]),
             A=data["A"].tocsc(),
             b=data["b"],
             equalities=dims.zero,
@@ -154,7 +157,7 @@ class Boxed:
             conic: the program.
             box: CVXPY variable, one-dimensional, that will be bounded.
         """
-        self._offset = conic.offset
+        self._offset, self._cutoff = conic.offset, np.inf
         columns = conic.columns(box)
         n = len(columns)
         pick = sparse.csc_matrix((np.ones(n), (np.arange(n), columns)), shape=(n, conic.A.shape[1]))
@@ -165,9 +168,26 @@ class Boxed:
             conic.P, conic.q, A, self._b, [*conic.all_cones, clarabel.NonnegativeConeT(2 * n)], rough_settings()
         )
 
-    def solve(self, lower: np.ndarray, upper: np.ndarray) -> Solution:
-        """Minimise with the box variable between two vectors."""
+        # The dual objective bounds the optimum up to (dual residual) · ‖y‖₁; entries of y are of order 1.
+        self._slack = 10.0 * A.shape[1]
+        self._solver.set_termination_callback(self._passed)
+
+    def _passed(self, info: Any) -> bool:
+        return info.cost_dual + self._offset - self._slack * info.res_dual > self._cutoff
+
+    def solve(self, lower: np.ndarray, upper: np.ndarray, cutoff: float = np.inf) -> Solution:
+        """Minimise with the box variable between two vectors.
+
+        Args:
+            lower: bound of the box variable.
+            upper: likewise.
+            cutoff: stop as soon as the optimum is known to be higher.
+        """
+        self._cutoff = cutoff
         self._b[-2 * self._n : -self._n] = upper
         self._b[-self._n :] = -lower
         self._solver.update(b=self._b)
-        return _read(self._solver.solve(), self._offset)
+        result = self._solver.solve()
+        if result.status == _STATUS.CallbackTerminated:
+            return Solution("cut", np.nan, cutoff, np.zeros(0))
+        return _read(result, self._offset)

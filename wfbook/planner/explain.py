@@ -77,7 +77,7 @@ def _feasible(program, dropped: set[str]) -> bool:
     discrete = list(program.discrete.values())
     # Mentioned without effect, so that every discrete variable has columns.
     rows = program.rows(without=tuple(dropped)) + [v <= 1 for v in discrete] + [v >= 0 for v in discrete]
-    conic = Conic.compile(cp.Constant(0) * cp.sum(discrete[0]), rows)
+    conic = Conic.compile(cp.sum(discrete[0]), rows)
     n = conic.A.shape[1]
     integer = np.zeros(n)
     for variable in discrete:

@@ -19,54 +19,44 @@ Gait = tuple[np.ndarray, np.ndarray]
 def templates(problem: Problem) -> Iterator[Gait]:
     """Yield swing matrices and wheel's dynamics matrices of common gaits.
 
-    Trots and crawls of every length, begun at once or a slot later, from either side; with wheels also
-    those in which some legs land on wheels at their first swing, and in which one of them puts a foot
-    down at the end.
+    Trots and crawls of several lengths, from either side; with wheels also trots in which some legs
+    land on wheels at their first swing and then roll, and all of them on wheels but for one that puts a
+    foot down to stop.
     """
     L, J = problem.legs, problem.slots
     last = J - 1 if problem.final_stance else J
-    cycles = [cycle[shift:] + cycle[:shift] for cycle in (TROT, CRAWL) for shift in range(len(cycle))]
-    feet = np.zeros((L, J), int)
-    yield feet, feet
-    for cycle in cycles:
-        for delay in range(min(2, last)):
-            for swings in range(1, last - delay + 1):
-                S = np.zeros((L, J), int)
-                for i in range(swings):
-                    S[list(cycle[i % len(cycle)]), delay + i] = 1
-                yield S, feet
-    if problem.wheels:
-        yield from _wheeled(problem, last)
-
-
-def _wheeled(problem: Problem, last: int) -> Iterator[Gait]:
-    """Yield trots in which a set of legs changes to wheels at the first swing and then rolls."""
-    L, J = problem.legs, problem.slots
+    feet = np.array([[int(e == "wheel")] * J for e in problem.start_end_effectors])
+    lengths = sorted({last - i for i in (0, 1, 2, 3, last // 2)} & set(range(1, last + 1)))
+    yield np.zeros((L, J), int), feet
+    for cycle in (TROT, TROT[::-1], CRAWL, CRAWL[1:] + CRAWL[:1]):
+        for swings in lengths:
+            S = np.zeros((L, J), int)
+            for j in range(swings):
+                S[list(cycle[j % len(cycle)]), j] = 1
+            yield S, feet
+    if not problem.wheels:
+        return
     for rolling in range(1, 2**L):
         roll = [leg for leg in range(L) if rolling >> leg & 1]
         for pairs in (TROT, TROT[::-1]):
-            for begin in range(min(2, last)):
-                for steps in range(min(last - begin, 8) + 1):
-                    S = np.zeros((L, J), int)
-                    wheel = np.zeros((L, J), int)
-                    for i in range(min(max(steps, 2), last - begin)):
-                        for leg in pairs[i % 2]:
-                            first = not S[leg].any()
-                            if (leg in roll and first) or (leg not in roll and i < steps):
-                                S[leg, begin + i] = 1
-                                if leg in roll:
-                                    wheel[leg, begin + i :] = 1
-                    if len(roll) == L and problem.final_stance:
-                        for leg in range(L):
+            for steps in sorted({min(n, last) for n in (2, 4, 8)}):
+                S, wheel = np.zeros((L, J), int), feet.copy()
+                for j in range(steps):
+                    for leg in pairs[j % 2]:
+                        if leg not in roll or not S[leg].any():
+                            S[leg, j] = 1
+                            wheel[leg, j:] = leg in roll
+                yield S, wheel
+                if len(roll) == L and steps == min(2, last):
+                    for leg in (0, 2):
+                        for j in {last - 1, (last + steps) // 2}:
                             stop, braked = S.copy(), wheel.copy()
-                            stop[leg, last - 1], braked[leg, last - 1 :] = 1, 0
+                            stop[leg, j], braked[leg, j:] = 1, 0
                             yield stop, braked
-                    else:
-                        yield S, wheel
 
 
 def neighbours(problem: Problem, S: np.ndarray, wheel: np.ndarray) -> Iterator[Gait]:
-    """Yield gaits one small change away: drop, add or shift a swing, change what a leg lands on."""
+    """Yield gaits one small change away: drop or shift a swing, change what a leg lands on."""
     L, J = S.shape
     landed = [[(j, wheel[leg, j]) for j in np.flatnonzero(S[leg])] for leg in range(L)]
     for leg in range(L):
@@ -78,10 +68,6 @@ def neighbours(problem: Problem, S: np.ndarray, wheel: np.ndarray) -> Iterator[G
                     yield _with(problem, S, wheel, leg, sorted([*rest, (other, kind)]))
             if problem.wheels:
                 yield _with(problem, S, wheel, leg, sorted([*rest, (j, 1 - kind)]))
-        for j in range(J):
-            if not S[leg, j]:
-                for kind in range(1 + problem.wheels):
-                    yield _with(problem, S, wheel, leg, sorted([*landed[leg], (j, kind)]))
     for pair in ((0, 3), (1, 2)):
         for j in range(J):
             if S[pair[0], j] and S[pair[1], j]:

@@ -20,8 +20,8 @@ from wfbook.planner.program import Program
 INTEGRAL = 1e-5
 """How close to an integer counts as one."""
 
-_STRONG = 8  # candidates whose children are solved before one is chosen
-_RELIABLE = 4  # after so many observations a pseudo-cost is believed
+_STRONG = 6  # candidates whose children are solved before one is chosen
+_RELIABLE = 2  # after so many observations a pseudo-cost is believed
 
 
 @dataclass
@@ -181,13 +181,20 @@ class Kernel:
         lower[layout.wheel], upper[layout.wheel] = low[:, 1:], up[:, 1:]
         return True
 
-    def bound(self, lower: np.ndarray, upper: np.ndarray) -> Solution:
-        """Solve the QP relaxation over a box; remembered, for children are bounded before they are made."""
-        key = np.concatenate([lower, upper]).astype(np.int8).tobytes()
-        if key not in self._bounds:
+    def bound(self, lower: np.ndarray, upper: np.ndarray, cutoff: float = np.inf) -> Solution:
+        """Solve the QP relaxation over a box; remembered, for children are bounded before they are made.
+
+        Args:
+            lower: the box's lower vector.
+            upper: its upper vector.
+            cutoff: stop as soon as the bound is known to be higher.
+        """
+        key = np.concatenate([lower, upper]).astype(np.int16).tobytes()
+        known = self._bounds.get(key)
+        if known is None or (known.status == "cut" and known.bound < cutoff):
             self.qps += 1
-            self._bounds[key] = self._qp.solve(lower.astype(float), upper.astype(float))
-        return self._bounds[key]
+            known = self._bounds[key] = self._qp.solve(lower.astype(float), upper.astype(float), cutoff)
+        return known
 
     def values(self, solution: Solution) -> np.ndarray:
         """Return the branching variables' values in a relaxation's solution."""
@@ -294,7 +301,7 @@ class Kernel:
         """Bound a child and learn from it; infinite where nothing of interest is left."""
         if child is None:
             return np.inf
-        found = self.bound(*child)
+        found = self.bound(*child, cutoff)
         if found.bound >= cutoff:
             self.pruned = min(self.pruned, found.bound)
             return np.inf

@@ -148,10 +148,10 @@ def common(problem: Problem, S: Any, wheel: Any, force: list[Any], friction: lis
     for i in range(3):
         program.add("reach", lever[i] >= ones * robot.reach_lower[:, i], lever[i] <= ones * robot.reach_upper[:, i])
     height = problem.ground + robot.height
-    program.add("reach", cp.abs(x[2] - height) <= robot.reach[2])
+    program.add("reach", *within(x[2] - height, robot.reach[2]))
     program.add("speed", v[0] <= limits.speed[0], v[0] >= -limits.speed[1])
-    program.add("speed", *(cp.abs(v[i]) <= limits.lateral_speed for i in (1, 2)))
-    program.add("speed", *(cp.abs(angle) <= limits.angle for angle in theta))
+    program.add("speed", *(side for i in (1, 2) for side in within(v[i], limits.lateral_speed)))
+    program.add("speed", *(side for angle in theta for side in within(angle, limits.angle)))
 
     place = (*problem.start, height)
     program.add("start", *(x[i][0] == place[i] for i in range(3)), *(p[i][0] == problem.start_contacts[:, i] for i in (0, 1)))
@@ -159,9 +159,15 @@ def common(problem: Problem, S: Any, wheel: Any, force: list[Any], friction: lis
     if problem.final_stance:
         program.add("end", *(z[K] == 0 for z in (*v, *omega)), S[:, -1] == 0)
         nominal = robot.stance
-        program.add("end", *(cp.abs(lever[i][K] - nominal[:, i]) <= limits.rest_offset[i] for i in (0, 1)))
+        for i in (0, 1):
+            program.add("end", *within(lever[i][K] - nominal[:, i], limits.rest_offset[i]))
     program.cost = motion_cost(program) + problem.weights.bounds * sum(cp.sum(U) for U in (*total[0], *total[1]))
     return program
+
+
+def within(expression: Any, limit: Any) -> list[Any]:
+    """State ``|expression| ≤ limit`` as two rows; CVXPY's ``abs`` would add a variable for each entry."""
+    return [expression <= limit, -expression <= limit]
 
 
 def _vectors(K: int) -> list[tuple[str, int]]:

@@ -19,7 +19,7 @@ import numpy as np
 
 from wfbook.centroidal import GRAVITY, midpoint_integration
 from wfbook.planner.problem import Problem
-from wfbook.planner.program import Grid
+from wfbook.planner.program import Grid, within
 from wfbook.planner.tight import centroid_bounds, flow, mccormick, pattern_hull
 from wfbook.swing import quintic_basis, septic_basis
 
@@ -63,7 +63,7 @@ def build(problem: Problem) -> Relaxation:
     place = (*problem.start, height)
     constraints += [r == 0 for r in midpoint_integration(x, v, a, dt)]
     constraints += [x[i][0] == place[i] for i in range(3)] + [v[i][0] == 0 for i in range(3)]
-    constraints += [v[0] <= limits.speed[0], v[0] >= -limits.speed[1], cp.abs(x[2] - height) <= robot.reach[2]]
+    constraints += [v[0] <= limits.speed[0], v[0] >= -limits.speed[1], *within(x[2] - height, robot.reach[2])]
     if problem.final_stance:
         constraints += [v[i][K] == 0 for i in range(3)] + [S[:, -1] == 0]
     cost += w.goal * sum(cp.square(x[i][K] - problem.goal[i]) for i in range(2))
@@ -97,8 +97,8 @@ def _forces(problem: Problem, a: list[Any], stance: dict, sizes: Any) -> tuple[A
     on_feet = normal - on_wheels
     rows.append(on_feet >= 0)
     rows.append(on_feet <= problem.limits.force * (spread @ cp.sum(stance["foot"], axis=0)))
-    rows.append(cp.abs(along) <= region.mu_foot * on_feet + region.mu_wheel * on_wheels)
-    rows.append(cp.abs(across) <= region.mu_foot * on_feet + region.mu_wheel_lateral * on_wheels)
+    rows += within(along, region.mu_foot * on_feet + region.mu_wheel * on_wheels)
+    rows += within(across, region.mu_foot * on_feet + region.mu_wheel_lateral * on_wheels)
     cost += weight / L * (cp.sum_squares(along) + cp.sum_squares(across))
     push = (along - region.rolling_resistance * on_wheels, across, normal - 1.0)
     rows += [a[i] == GRAVITY * push[i] for i in range(3)]
@@ -119,7 +119,7 @@ def _levers(
     cost, rows = 0, []
     for i in range(2):
         place, step = cp.Variable((L, J + 1)), cp.Variable((L, J))
-        rows += [place[:, 0] == problem.start_contacts[:, i], cp.abs(step) <= limits.step[i] * S]
+        rows += [place[:, 0] == problem.start_contacts[:, i], *within(step, limits.step[i] * S)]
         ends = x[i][0 : K + 1 : rho]
         during = mean @ x[i][1:]
         rolled = rolled_mean = slack = 0
@@ -142,9 +142,9 @@ def _levers(
         rows.append(place[:, 1:] == place[:, :-1] + step + rolled)
         nominal = robot.stance[:, [i]] @ ones
         lever = place - legs @ cp.reshape(ends, (1, J + 1), order="C")
-        rows.append(cp.abs(lever[:, 1:] - nominal) <= robot.reach[i])
+        rows += within(lever[:, 1:] - nominal, robot.reach[i])
         if problem.final_stance:
-            rows.append(cp.abs(lever[:, -1] - robot.stance[:, i]) <= limits.rest_offset[i])
+            rows += within(lever[:, -1] - robot.stance[:, i], limits.rest_offset[i])
         foot = place[:, :-1] + share[2] * step + rolled_mean + slack
         lever_mean = foot - legs @ cp.reshape(during, (1, J), order="C")
         middle = lever_mean + (lever[:, :-1] - lever[:, 1:]) / (2 * rho)
@@ -159,9 +159,14 @@ def _levers(
         rows += [parts >= np.diag([e[0] for e in edge]) @ sizes, parts <= np.diag([e[1] for e in edge]) @ sizes]
         rows.append(cp.sum(vertex, axis=0) == counts @ parts)
         cost += w.centroid * rho * cp.sum_squares(cp.sum(parts, axis=0))
-        if not problem.wheels:
-            spread = x[i][1:] - grid.spread @ during
-            cost += (w.centroid + 4 * w.bounds * counts.min()) * cp.sum_squares(spread)
+        # Within a slot whose standing legs are all feet, levers vary as the centre of mass does.
+        varied = x[i][1:] - grid.spread @ during
+        if problem.wheels:
+            most = 0.5 * (rho - 1) * problem.dt * max(*limits.speed, limits.lateral_speed)
+            rolling = grid.spread @ cp.sum(stance["wheel"], axis=0)
+            about, varied = varied, cp.Variable(K, nonneg=True)
+            rows += [varied >= side - most * rolling for side in (about, -about)]
+        cost += (w.centroid + 4 * w.bounds * counts.min()) * cp.sum_squares(varied)
     return cost, rows
 
 

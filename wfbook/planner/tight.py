@@ -20,7 +20,7 @@ import numpy as np
 
 from wfbook.friction import friction_pyramid, rolling_friction
 from wfbook.planner.problem import Problem
-from wfbook.planner.program import Grid, Program, common
+from wfbook.planner.program import Grid, Program, common, within
 
 
 def build(problem: Problem) -> Program:
@@ -173,7 +173,7 @@ def _motion(program: Program, grid: Grid, stance: dict, landing: dict) -> None:
     J, K, L, rho = problem.slots, problem.knots, problem.legs, problem.knots_per_slot
     step = [cp.Variable((L, J), name=f"step{i}") for i in range(2)]
     for i in range(2):
-        program.add("step", cp.abs(step[i]) <= problem.limits.step[i] * program.S)
+        program.add("step", *within(step[i], problem.limits.step[i] * program.S))
     moved = [grid.step @ step[i].T for i in range(2)]
     if problem.wheels:
         low, high = -problem.limits.speed[1], problem.limits.speed[0]

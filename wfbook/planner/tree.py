@@ -186,7 +186,7 @@ class _Bound(Relax):
         box = tree.kernel.propagate(*tree.box())
         if box is None:
             return {"result": SCIP_RESULT.CUTOFF}
-        found = tree.kernel.bound(*box)
+        found = tree.kernel.bound(*box, tree.cutoff)
         if found.bound >= tree.cutoff:
             tree.kernel.pruned = min(tree.kernel.pruned, found.bound)
             return {"result": SCIP_RESULT.CUTOFF}
