@@ -1,7 +1,7 @@
 """The search against enumeration, the two formulations against each other, bounds against truth."""
 
 from dataclasses import replace
-from itertools import product
+from itertools import pairwise, product
 
 import cvxpy as cp
 import numpy as np
@@ -111,7 +111,10 @@ def test_the_relaxation_is_below_every_leaf_and_rises_as_boxes_shrink():
         if leaf is None or leaf.status != "solved":
             continue
         z = kernel.vector(S, wheel)
-        low, high = np.where(rng.random(z.size) < 0.3, z, root[0]), np.where(rng.random(z.size) < 0.3, z, root[1])
+        low, high = (
+            np.where(rng.random(z.size) < 0.3, z, root[0]),
+            np.where(rng.random(z.size) < 0.3, z, root[1]),
+        )
         box = kernel.propagate(low, high)
         assert box is not None
         assert (box[0] <= z).all() and (z <= box[1]).all(), "propagation lost a gait of the box"
@@ -195,7 +198,7 @@ def test_progress_is_monotonous():
     solve(problem(5, ("foot",)), progress=seen.append)
     assert len(seen) > 2
     incumbents = [s.incumbent for s in seen]
-    assert all(later <= earlier for earlier, later in zip(incumbents, incumbents[1:], strict=False))
+    assert all(later <= earlier for earlier, later in pairwise(incumbents))
 
 
 def test_an_infeasible_problem_names_a_minimal_set_of_groups():

@@ -65,7 +65,7 @@ class Robot:
         """Upper bound of ``p − x`` for each leg, ``(L, 3)``; a swinging foot may rise by its apex."""
         dx, dy, dz = self.reach
         top = -self.height + dz + self.swing_height
-        return np.column_stack([self.stance + [dx, dy], np.full(len(self.stance), top)])
+        return np.column_stack([self.stance + np.array([dx, dy]), np.full(len(self.stance), top)])
 
 
 @cache

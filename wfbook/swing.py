@@ -26,7 +26,9 @@ def _coefficients(apex: bool) -> np.ndarray:
     conditions = [(s, order) for s in (0.0, 1.0) for order in (0, 1, 2)]
     if apex:
         conditions += [(0.5, 0), (0.5, 1)]
-    G = np.array([[poly.polyval(s, poly.polyder(np.eye(n)[i], order)) for i in range(n)] for s, order in conditions])
+    G = np.array(
+        [[poly.polyval(s, poly.polyder(np.eye(n)[i], order)) for i in range(n)] for s, order in conditions]
+    )
     return np.linalg.inv(G)
 
 
@@ -44,7 +46,9 @@ def quintic_basis(phase: np.ndarray, derivative: int = 0) -> np.ndarray:
     Returns:
         ``(..., 4)``: the weights of ``p0``, ``T v0``, ``pf`` and ``T vf``.
     """
-    columns = [poly.polyval(np.asarray(phase, float), poly.polyder(c, derivative)) for c in _coefficients(False).T]
+    columns = [
+        poly.polyval(np.asarray(phase, float), poly.polyder(c, derivative)) for c in _coefficients(False).T
+    ]
     return np.stack([columns[i] for i in (0, 1, 3, 4)], axis=-1)
 
 
@@ -61,7 +65,9 @@ def septic_basis(phase: np.ndarray, derivative: int = 0) -> np.ndarray:
     Returns:
         ``(..., 3)``: the weights of the start, end and apex heights.
     """
-    columns = [poly.polyval(np.asarray(phase, float), poly.polyder(c, derivative)) for c in _coefficients(True).T]
+    columns = [
+        poly.polyval(np.asarray(phase, float), poly.polyder(c, derivative)) for c in _coefficients(True).T
+    ]
     return np.stack([columns[i] for i in (0, 3, 6)], axis=-1)
 
 

@@ -34,7 +34,11 @@ def build(problem: Problem) -> Program:
     wheel = cp.Variable((L, J), boolean=True, name="D_wheel") if problem.wheels else np.zeros((L, J))
     force = [cp.Variable((K, L), name=f"F{i}") for i in range(3)]
     resists = problem.wheels and problem.region.rolling_resistance > 0
-    friction = [cp.Variable((K, L), name="f0") if resists else np.zeros((K, L)), np.zeros((K, L)), np.zeros((K, L))]
+    friction = [
+        cp.Variable((K, L), name="f0") if resists else np.zeros((K, L)),
+        np.zeros((K, L)),
+        np.zeros((K, L)),
+    ]
     program = common(problem, S, wheel, force, friction, per_leg=True)
     grid = Grid.of(problem)
     _gait(program)
@@ -78,7 +82,7 @@ def _gait(program: Program) -> None:
 def _motion(program: Program, grid: Grid) -> None:
     """State eqs 2–6 and 19–22: which knots follow the spline, stay, or roll."""
     problem, p, x, v = program.problem, program.p, program.x, program.v
-    J, K, L, rho = problem.slots, problem.knots, problem.legs, problem.knots_per_slot
+    K, L, rho = problem.knots, problem.legs, problem.knots_per_slot
     swing = grid.spread @ program.S.T
     rolls = grid.spread @ program.wheel.T
     ends = grid.begin.argmax(axis=1) + rho
@@ -101,7 +105,9 @@ def _motion(program: Program, grid: Grid) -> None:
         weights = [grid.lift.sum(axis=1)[:, None], grid.land.sum(axis=1)[:, None]]
         for lifts in (0, 1):
             for lands in (0, 1):
-                path = spline + sum(cp.multiply(w, s) * on for w, s, on in zip(weights, speeds, (lifts, lands)))
+                path = spline + sum(
+                    cp.multiply(w, s) * on for w, s, on in zip(weights, speeds, (lifts, lands), strict=True)
+                )
                 which = [z if on else 1 - z for z, on in zip(before, (lifts, lands), strict=True)]
                 program.add("motion", *implies(swing + which[0] + which[1] - 2, now - path, big))
         rolled = cp.reshape(x[0][1:] - x[0][:-1], (K, 1), order="C") @ columns
@@ -125,7 +131,9 @@ def _forces(program: Program, grid: Grid) -> None:
     rolls = grid.spread @ program.wheel.T
     program.add("friction", n <= big * (1 - grid.spread @ program.S.T))
     if not problem.wheels:
-        program.add("friction", *(side <= 0 for side in friction_pyramid(n, t, b, region.mu_foot, region.mu_foot)))
+        program.add(
+            "friction", *(side <= 0 for side in friction_pyramid(n, t, b, region.mu_foot, region.mu_foot))
+        )
         return
     widest = 2 * big * max(region.mu_foot, region.mu_wheel, region.mu_wheel_lateral)
     for side in friction_pyramid(n, t, b, region.mu_foot, region.mu_foot):
@@ -151,7 +159,9 @@ def _centroid(program: Program, grid: Grid) -> None:
     for i in range(2):
         vertex = cp.Variable((K, L), name=f"v{i}")
         c = program.x[i][1:] + program.centroid[i]
-        program.add("centroid", *implies(1 - swing, vertex - program.p[i][1:], big), *implies(swing, vertex, big))
+        program.add(
+            "centroid", *implies(1 - swing, vertex - program.p[i][1:], big), *implies(swing, vertex, big)
+        )
         for n in range(most + 1):
             here = grid.spread @ s[n]
             program.add("centroid", *implies(here, (L - n) * c - cp.sum(vertex, axis=1), 2 * L * big))

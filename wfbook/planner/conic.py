@@ -144,7 +144,11 @@ class Conic:
     @property
     def all_cones(self) -> list[Any]:
         """All cones in the order of the rows."""
-        return [clarabel.ZeroConeT(self.equalities), clarabel.NonnegativeConeT(self.inequalities), *self.cones]
+        return [
+            clarabel.ZeroConeT(self.equalities),
+            clarabel.NonnegativeConeT(self.inequalities),
+            *self.cones,
+        ]
 
 
 class Boxed:
@@ -165,7 +169,12 @@ class Boxed:
         self._b = np.concatenate([conic.b, np.ones(n), np.zeros(n)])
         self._n = n
         self._solver = clarabel.DefaultSolver(
-            conic.P, conic.q, A, self._b, [*conic.all_cones, clarabel.NonnegativeConeT(2 * n)], rough_settings()
+            conic.P,
+            conic.q,
+            A,
+            self._b,
+            [*conic.all_cones, clarabel.NonnegativeConeT(2 * n)],
+            rough_settings(),
         )
 
         # The dual objective bounds the optimum up to (dual residual) · ‖y‖₁; entries of y are of order 1.

@@ -25,11 +25,14 @@ def read(program: Program, bounds: bool = True) -> dict[str, list[np.ndarray]]:
     names = ["x", "v", "a", "theta", "omega", "alpha", "p", "force", "friction"]
     names += ["U_plus", "U_minus"] if bounds else []
     return {
-        name: [c.value if isinstance(c, cp.Expression) else c for c in getattr(program, name)] for name in names
+        name: [c.value if isinstance(c, cp.Expression) else c for c in getattr(program, name)]
+        for name in names
     }
 
 
-def plan_of(problem: Problem, values: dict[str, Any], S: np.ndarray, wheel: np.ndarray, meta: dict[str, Any]) -> Plan:
+def plan_of(
+    problem: Problem, values: dict[str, Any], S: np.ndarray, wheel: np.ndarray, meta: dict[str, Any]
+) -> Plan:
     """Assemble a plan from the program's values.
 
     Args:
@@ -42,7 +45,9 @@ def plan_of(problem: Problem, values: dict[str, Any], S: np.ndarray, wheel: np.n
         meta: entries of ``meta`` besides those that describe the problem.
     """
     weight = problem.robot.weight
-    world = {name: np.stack(values[name], axis=-1) for name in ("x", "v", "a", "theta", "omega", "alpha", "p")}
+    world = {
+        name: np.stack(values[name], axis=-1) for name in ("x", "v", "a", "theta", "omega", "alpha", "p")
+    }
     force, friction = ([np.asarray(c, float) for c in values[name]] for name in ("force", "friction"))
     lever = [world["p"][..., i] - world["x"][:, i, None] for i in range(3)]
     middle = [0.5 * (r[1:] + r[:-1]) for r in lever]

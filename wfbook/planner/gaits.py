@@ -1,6 +1,6 @@
 """Gaits a roboticist would try first, and small changes to a gait: the search's primal heuristics."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -94,11 +94,14 @@ def mirrored(gait: Gait) -> Gait:
     return gait[0][list(MIRROR)], gait[1][list(MIRROR)]
 
 
-def improve(kernel: Kernel) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
+def improve(
+    kernel: Kernel, stop: Callable[[], bool] = lambda: False
+) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
     """Yield ever better gaits: templates ranked by the QP, the best solved exactly, then changed bit by bit.
 
     Args:
         kernel: bounds and leaves of the problem.
+        stop: asked now and then; once true, nothing more is tried.
 
     Yields:
         Cost, swing matrix and wheel's dynamics matrix, each better than the one before.
@@ -109,7 +112,7 @@ def improve(kernel: Kernel) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
     def score(gait: Gait) -> float:
         image = mirrored(gait)
         key = gait_key(*gait)
-        if key in seen or (symmetric and gait_key(*image) in seen) or not kernel.admissible(*gait):
+        if stop() or key in seen or (symmetric and gait_key(*image) in seen) or not kernel.admissible(*gait):
             return np.inf
         seen.add(key)
         return kernel.gait_bound(*gait)
@@ -127,11 +130,12 @@ def improve(kernel: Kernel) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
         if current is None:
             return
         ranked = sorted(
-            ((score(gait), i, gait) for i, gait in enumerate(neighbours(problem, *current))), key=lambda r: r[:2]
+            ((score(gait), i, gait) for i, gait in enumerate(neighbours(problem, *current))),
+            key=lambda r: r[:2],
         )
         improved = False
         for bound, _, gait in ranked:
-            if bound >= best:
+            if bound >= best or stop():
                 break
             value = kernel.leaf(*gait).value
             if value < best:

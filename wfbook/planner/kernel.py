@@ -79,7 +79,9 @@ class Kernel:
         self.layout = Layout.of(problem)
         self.program = tight.build(problem)
         self.conic = Conic.compile(self.program.cost, self.program.rows())
-        self._discrete = np.concatenate([self.conic.columns(v).ravel() for v in self.program.discrete.values()])
+        self._discrete = np.concatenate(
+            [self.conic.columns(v).ravel() for v in self.program.discrete.values()]
+        )
         relaxed = relaxation.build(problem)
         counts = cp.cumsum(relaxed.S, axis=1)
         parts = [cp.vec(relaxed.S, order="C")]
@@ -91,7 +93,9 @@ class Kernel:
         rows = [*relaxed.constraints, self._box == cp.hstack(parts), self._mirror == _mirror_row(relaxed.S)]
         self._qp_conic = Conic.compile(relaxed.cost, rows)
         self._columns = self._qp_conic.columns(self._box)
-        self._qp_discrete = np.concatenate([self._qp_conic.columns(v).ravel() for v in relaxed.discrete.values()])
+        self._qp_discrete = np.concatenate(
+            [self._qp_conic.columns(v).ravel() for v in relaxed.discrete.values()]
+        )
         self._qp_keys = list(relaxed.discrete)
         self._qp = Boxed(self._symmetry_broken(), self._box)
         self._bounds: dict[bytes, Solution] = {}
@@ -227,6 +231,13 @@ class Kernel:
             self._leaves[key] = solve_fixed(self.conic, self._discrete, fixed)
         return self._leaves[key]
 
+    def priced(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Return the feasible gaits that were solved exactly, the cheapest first."""
+        shape = (2, self.problem.legs, self.problem.slots)
+        feasible = [(found.value, key) for key, found in self._leaves.items() if found.status == "solved"]
+        gaits = [np.frombuffer(key, np.int8).reshape(shape).astype(int) for _, key in sorted(feasible)]
+        return [(S, wheel) for S, wheel in gaits]
+
     def gait_bound(self, S: np.ndarray, wheel: np.ndarray) -> float:
         """Return the QP's lower bound of the cost of one gait."""
         self.qps += 1
@@ -238,7 +249,11 @@ class Kernel:
         """Tell whether a gait satisfies all that concerns integers alone."""
         root = self.root()
         z = self.vector(S, wheel)
-        return root is not None and bool((root[0] <= z).all() and (z <= root[1]).all()) and self.propagate(z, z) is not None
+        return (
+            root is not None
+            and bool((root[0] <= z).all() and (z <= root[1]).all())
+            and self.propagate(z, z) is not None
+        )
 
     def split(
         self, lower: np.ndarray, upper: np.ndarray, solution: Solution, cutoff: float
@@ -246,7 +261,8 @@ class Kernel:
         """Split a box in two (or in fewer, where a part is empty), on the variable that lifts the bound most.
 
         Args:
-            lower, upper: the box, propagated, not a single point.
+            lower: lower vector of the box, propagated and not a single point.
+            upper: its upper vector.
             solution: of its relaxation.
             cutoff: value above which nothing is of interest.
 
@@ -258,6 +274,10 @@ class Kernel:
         fraction = np.abs(z[open_] - np.rint(z[open_]))
         fractional = open_[fraction > INTEGRAL]
         candidates = fractional if len(fractional) else open_
+        # What a leg carries in the end decides more than what it carries on the way.
+        on_the_way = np.isin(candidates, self.layout.wheel[:, :-1])
+        if not on_the_way.all():
+            candidates = candidates[~on_the_way]
         score = self._score(candidates, z)
         order = candidates[np.argsort(-score, kind="stable")]
         best, best_children, best_gain = None, [], -1.0
@@ -266,7 +286,9 @@ class Kernel:
             if best is not None and (tried >= _STRONG or (reliable and tried >= 2)):
                 break
             children = self._children(lower, upper, index, z[index])
-            gains = [self._observe(child, index, side, solution, cutoff) for side, child in enumerate(children)]
+            gains = [
+                self._observe(child, index, side, solution, cutoff) for side, child in enumerate(children)
+            ]
             alive = [child for child, gain in zip(children, gains, strict=True) if np.isfinite(gain)]
             if len(alive) < 2:
                 return alive
@@ -354,7 +376,9 @@ def mirror_symmetric(problem: Problem) -> bool:
     kinds = list(problem.start_end_effectors)
     A, b = problem.region.halfspaces
     sides = {(round(r[0], 9), round(r[1], 9), round(c, 9)) for r, c in zip(A, b, strict=True)}
-    images = {(round(r[0], 9), round(-r[1], 9), round(c - 2 * axis * r[1], 9)) for r, c in zip(A, b, strict=True)}
+    images = {
+        (round(r[0], 9), round(-r[1], 9), round(c - 2 * axis * r[1], 9)) for r, c in zip(A, b, strict=True)
+    }
     patterns = {frozenset(p) for p in problem.patterns}
     return bool(
         contacts

@@ -4,6 +4,7 @@ import json
 import os
 import tempfile
 import zipfile
+import zlib
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Self
@@ -133,7 +134,18 @@ class Plan:
         try:
             with np.load(path, allow_pickle=False) as file:
                 data = {name: file[name] for name in file.files}
-        except (zipfile.BadZipFile, EOFError, ValueError, KeyError) as error:
+        except FileNotFoundError:
+            raise
+        except (
+            zipfile.BadZipFile,
+            zlib.error,
+            EOFError,
+            OSError,
+            ValueError,
+            KeyError,
+            RuntimeError,
+        ) as error:
+            # A damaged archive shows itself in any of these ways.
             raise ValueError(f"{path}: not a plan file, or truncated ({error})") from error
         missing = [name for name in (*_ARRAYS, "terrain", "meta") if name not in data]
         if missing:
@@ -170,13 +182,22 @@ class Plan:
             array = getattr(self, name)
             if array.shape != shape:
                 raise ValueError(f"{path}: {name}: shape {array.shape}, expected {shape}")
-            if not np.issubdtype(array.dtype, np.number) or not np.isfinite(array).all():
+            if array.dtype.kind not in "iuf" or not np.isfinite(array).all():
                 raise ValueError(f"{path}: {name}: holds a value that is not a finite number")
         if J < 1 or K % max(J, 1) or np.any(np.diff(self.t) <= 0):
             raise ValueError(f"{path}: t: {K} intervals do not make {J} whole slots in rising time")
-        for key in ("stage", "start_end_effectors", "swing_height"):
+        if (self.D.sum(axis=(2, 3)) != 1).any():
+            raise ValueError(f"{path}: D: a leg needs one region and one end effector in each slot (eq. 17)")
+        for key in ("stage", "start_end_effectors", "swing_height", "com_height"):
             if key not in self.meta:
                 raise ValueError(f"{path}: meta: missing key {key!r}")
+        for key in ("swing_height", "com_height"):
+            value = self.meta[key]
+            if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < np.inf:
+                raise ValueError(f"{path}: meta: {key} {value!r} is not a positive number")
+        kinds = self.meta["start_end_effectors"]
+        if not isinstance(kinds, list) or len(kinds) != L or any(k not in END_EFFECTORS for k in kinds):
+            raise ValueError(f"{path}: meta: start_end_effectors {kinds!r}, expected {L} of {END_EFFECTORS}")
 
 
 _ARRAYS = tuple(field.name for field in fields(Plan) if field.name not in ("terrain", "meta"))

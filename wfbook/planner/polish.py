@@ -73,7 +73,8 @@ class Polisher:
         fixed = np.concatenate([known[key].ravel() for key in self.program.discrete])
         lever, force = _middle_levers(plan), [plan.lam[..., i] / weight for i in range(3)]
         radius, best, merit, steps = np.array([0.05, 0.25]), None, np.inf, 0
-        for steps in range(1, _ITERATIONS + 1):
+        while steps < _ITERATIONS:
+            steps += 1
             found = solve_fixed(self._linearised(lever, force, radius), columns, fixed)
             if found.status != "solved":
                 # The relaxed plan may lie outside the polish's rows by a solver's tolerance.
@@ -113,8 +114,14 @@ class Polisher:
         knots = np.arange(K)
 
         def put(axis: int, where: np.ndarray, what: np.ndarray) -> None:
-            at = np.broadcast_to((axis * K + knots)[:, None] if where.ndim == 2 else axis * K + knots, where.shape)
-            rows.append(at.ravel()), columns.append(where.ravel()), entries.append(np.broadcast_to(what, where.shape).ravel())
+            at = np.broadcast_to(
+                (axis * K + knots)[:, None] if where.ndim == 2 else axis * K + knots, where.shape
+            )
+            (
+                rows.append(at.ravel()),
+                columns.append(where.ravel()),
+                entries.append(np.broadcast_to(what, where.shape).ravel()),
+            )
 
         for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
             for axis in range(3):

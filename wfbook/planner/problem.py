@@ -114,18 +114,28 @@ class Problem:
         if np.shape(self.start_offsets) != (len(LEGS), 2) or not np.isfinite(self.start_offsets).all():
             raise ValueError(f"start_offsets: not a finite array of shape {(len(LEGS), 2)}")
         if "foot" not in self.end_effectors or not set(self.end_effectors) <= set(END_EFFECTORS):
-            raise ValueError(f"end_effectors: {self.end_effectors!r}, expected ('foot',) or ('foot', 'wheel')")
-        if len(self.start_end_effectors) != len(LEGS) or not set(self.start_end_effectors) <= set(self.end_effectors):
-            raise ValueError(f"start_end_effectors: {self.start_end_effectors!r}, one of {self.end_effectors!r} a leg")
+            raise ValueError(
+                f"end_effectors: {self.end_effectors!r}, expected ('foot',) or ('foot', 'wheel')"
+            )
+        if len(self.start_end_effectors) != len(LEGS) or not set(self.start_end_effectors) <= set(
+            self.end_effectors
+        ):
+            raise ValueError(
+                f"start_end_effectors: {self.start_end_effectors!r}, one of {self.end_effectors!r} a leg"
+            )
         if any(() not in self.patterns or not set(p) <= set(range(len(LEGS))) for p in self.patterns):
-            raise ValueError(f"patterns: {self.patterns!r}, expected sets of legs 0 to 3, the empty one among them")
+            raise ValueError(
+                f"patterns: {self.patterns!r}, expected sets of legs 0 to 3, the empty one among them"
+            )
         self._check_terrain()
 
     def _check_terrain(self):
         """Refuse terrain this version can't plan on, and goals outside of it."""
         regions = self.terrain.regions
         if len(regions) != 1 or abs(regions[0].normal[2] - 1.0) > 1e-9:
-            raise ValueError(f"terrain: {self.terrain.name!r} is not one level region, which is all this version plans on")
+            raise ValueError(
+                f"terrain: {self.terrain.name!r} is not one level region, all this version plans on"
+            )
         for name in ("start", "goal"):
             place = getattr(self, name)
             if self.terrain.region_at(*place) is None:
@@ -135,7 +145,7 @@ class Problem:
         if distance > furthest and not self.beyond_reach:
             raise ValueError(
                 f"goal: {tuple(self.goal)} is out of reach: {distance:.2f} m away, "
-                f"{furthest:.2f} m at {self.limits.speed[0]} m/s in {self.slots} slots of {self.slot_duration} s"
+                f"{furthest:.2f} m at {self.limits.speed[0]} m/s in {self.duration:.1f} s"
             )
 
     @property

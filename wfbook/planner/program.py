@@ -5,8 +5,8 @@ components come first, ``force[i]`` of shape ``(K, L)``. The two formulations (:
 :mod:`.paper`) add what ties the binaries to this.
 """
 
-from dataclasses import dataclass, field
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import cvxpy as cp
@@ -102,7 +102,9 @@ class Grid:
         return cls(spread, begin, columns[0], T * columns[1], T * columns[2], apex, age)
 
 
-def common(problem: Problem, S: Any, wheel: Any, force: list[Any], friction: list[Any], per_leg: bool) -> Program:
+def common(
+    problem: Problem, S: Any, wheel: Any, force: list[Any], friction: list[Any], per_leg: bool
+) -> Program:
     """State what both formulations share: dynamics, torque bounds, reach, start, end and cost.
 
     Args:
@@ -146,7 +148,9 @@ def common(problem: Problem, S: Any, wheel: Any, force: list[Any], friction: lis
     robot, limits = problem.robot, problem.limits
     ones = np.ones((K + 1, 1))
     for i in range(3):
-        program.add("reach", lever[i] >= ones * robot.reach_lower[:, i], lever[i] <= ones * robot.reach_upper[:, i])
+        program.add(
+            "reach", lever[i] >= ones * robot.reach_lower[:, i], lever[i] <= ones * robot.reach_upper[:, i]
+        )
     height = problem.ground + robot.height
     program.add("reach", *within(x[2] - height, robot.reach[2]))
     program.add("speed", v[0] <= limits.speed[0], v[0] >= -limits.speed[1])
@@ -154,14 +158,20 @@ def common(problem: Problem, S: Any, wheel: Any, force: list[Any], friction: lis
     program.add("speed", *(side for angle in theta for side in within(angle, limits.angle)))
 
     place = (*problem.start, height)
-    program.add("start", *(x[i][0] == place[i] for i in range(3)), *(p[i][0] == problem.start_contacts[:, i] for i in (0, 1)))
+    program.add(
+        "start",
+        *(x[i][0] == place[i] for i in range(3)),
+        *(p[i][0] == problem.start_contacts[:, i] for i in (0, 1)),
+    )
     program.add("start", *(z[0] == 0 for z in (*v, *theta, *omega)))
     if problem.final_stance:
         program.add("end", *(z[K] == 0 for z in (*v, *omega)), S[:, -1] == 0)
         nominal = robot.stance
         for i in (0, 1):
             program.add("end", *within(lever[i][K] - nominal[:, i], limits.rest_offset[i]))
-    program.cost = motion_cost(program) + problem.weights.bounds * sum(cp.sum(U) for U in (*total[0], *total[1]))
+    program.cost = motion_cost(program) + problem.weights.bounds * sum(
+        cp.sum(U) for U in (*total[0], *total[1])
+    )
     return program
 
 
@@ -181,7 +191,9 @@ def _above_squares(u: Any, pair: tuple[Any, Any], per_leg: bool) -> list[Any]:
         flat = [cp.vec(z, order="C") for z in (2 * pair[0], 2 * pair[1], u - 1)]
         return [cp.SOC(cp.vec(u, order="C") + 1, cp.vstack(flat), axis=0)]
     K = u.shape[0]
-    return [cp.SOC(u + 1, cp.hstack([2 * pair[0], 2 * pair[1], cp.reshape(u - 1, (K, 1), order="C")]).T, axis=0)]
+    return [
+        cp.SOC(u + 1, cp.hstack([2 * pair[0], 2 * pair[1], cp.reshape(u - 1, (K, 1), order="C")]).T, axis=0)
+    ]
 
 
 def motion_cost(program: Program) -> Any:

@@ -45,7 +45,7 @@ class Relaxation:
 
 def build(problem: Problem) -> Relaxation:
     """State the QP for a problem, with binaries relaxed to ``[0, 1]``."""
-    J, K, L, rho, dt = problem.slots, problem.knots, problem.legs, problem.knots_per_slot, problem.dt
+    J, K, L, dt = problem.slots, problem.knots, problem.legs, problem.dt
     w, robot, limits = problem.weights, problem.robot, problem.limits
     stance = {e: cp.Variable((L, J)) for e in problem.end_effectors}
     landing = {e: cp.Variable((L, J)) for e in problem.end_effectors}
@@ -88,7 +88,9 @@ def _forces(problem: Problem, a: list[Any], stance: dict, sizes: Any) -> tuple[A
     along, across = cp.Variable(K), cp.Variable(K)
     rows = [parts <= problem.limits.force * chosen @ np.diag(counts)]
     scale = np.diag(1.0 / np.sqrt(counts))
-    cost = weight * (cp.sum_squares((parts + 1 - chosen) @ scale) - cp.sum((1 - chosen) @ np.diag(1.0 / counts)))
+    cost = weight * (
+        cp.sum_squares((parts + 1 - chosen) @ scale) - cp.sum((1 - chosen) @ np.diag(1.0 / counts))
+    )
     normal = cp.sum(parts, axis=1)
     on_wheels = 0
     if problem.wheels:
@@ -133,7 +135,10 @@ def _levers(
             )
             age = problem.dt * grid.age[:rho].mean()
             rolled_mean, exact_mean = mccormick(
-                stance["wheel"], legs @ cp.reshape(during - ends[:-1], (1, J), order="C"), low * age, high * age
+                stance["wheel"],
+                legs @ cp.reshape(during - ends[:-1], (1, J), order="C"),
+                low * age,
+                high * age,
             )
             slack = cp.Variable((L, J))
             reach = problem.slot_duration * np.array([share[1], share[3]])
@@ -156,7 +161,10 @@ def _levers(
         away = lever_mean - vertex
         rows += [away >= cp.multiply(lower, S), away <= cp.multiply(upper, S)]
         edge = [centroid_bounds(problem, n, i) for n in range(sizes.shape[0])]
-        rows += [parts >= np.diag([e[0] for e in edge]) @ sizes, parts <= np.diag([e[1] for e in edge]) @ sizes]
+        rows += [
+            parts >= np.diag([e[0] for e in edge]) @ sizes,
+            parts <= np.diag([e[1] for e in edge]) @ sizes,
+        ]
         rows.append(cp.sum(vertex, axis=0) == counts @ parts)
         cost += w.centroid * rho * cp.sum_squares(cp.sum(parts, axis=0))
         # Within a slot whose standing legs are all feet, levers vary as the centre of mass does.

@@ -1,7 +1,7 @@
 """Solve a planning problem: formulation, search, plan; then the gait that can also be executed."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -63,7 +63,11 @@ def solve_executable(
     """Solve, polish, and search on while the best gait can't be polished.
 
     Args:
-        problem, formulation, gap, time_limit, progress: as for :func:`solve`.
+        problem: as for :func:`solve`, like the others.
+        formulation: "tight" or "paper"; only the first searches on after a gait that can't be polished.
+        gap: relative gap at which the search ends.
+        time_limit: of all searching, in seconds.
+        progress: called now and then.
 
     Returns:
         The relaxed plan and its polish. ``meta["rejected_gaits"]`` says how many gaits were cut off
@@ -79,7 +83,9 @@ def solve_executable(
         relaxed = solve(problem, formulation, gap, time_limit)
         polished = polisher.polish(relaxed)
         if not repaired(polished):
-            raise NoPlanError("the paper formulation's gait can't be polished; formulation='tight' searches on")
+            raise NoPlanError(
+                "the paper formulation's gait can't be polished; formulation='tight' searches on"
+            )
         return relaxed, polished
     search = Search(problem, gap, time_limit, progress)
     while True:
@@ -87,9 +93,15 @@ def solve_executable(
         polished = polisher.polish(relaxed)
         if repaired(polished):
             return relaxed, polished
-        if relaxed.meta["status"] != "optimal":
-            raise NoPlanError(f"{relaxed.meta['status']} before a gait was found that can be polished")
         search.exclude(relaxed)
+        if relaxed.meta["status"] != "optimal":
+            # No time to search on, but gaits that were not the best are at hand; the bound holds for all.
+            for second in search.known():
+                polished = polisher.polish(second)
+                if repaired(polished):
+                    return second, polished
+                search.exclude(second)
+            raise NoPlanError(f"{relaxed.meta['status']} before a gait was found that can be polished")
 
 
 def _check_limits(gap: float, time_limit: float) -> None:
@@ -103,12 +115,19 @@ class Search:
     """A search that can go on after a gait is excluded: bounds and leaves are remembered."""
 
     def __init__(
-        self, problem: Problem, gap: float, time_limit: float, progress: Callable[[Progress], None] | None = None
+        self,
+        problem: Problem,
+        gap: float,
+        time_limit: float,
+        progress: Callable[[Progress], None] | None = None,
     ):
         """Build and compile both programs.
 
         Args:
-            problem, gap, time_limit, progress: as for :func:`solve`.
+            problem: what is asked.
+            gap: relative gap at which a search ends.
+            time_limit: of all searches together, in seconds.
+            progress: called now and then.
         """
         begin = time.perf_counter()
         self.problem, self.gap, self.progress = problem, gap, progress
@@ -135,19 +154,30 @@ class Search:
             if status == "interrupted":
                 raise KeyboardInterrupt
             raise NoPlanError(f"no plan found within {self._spent:.1f} s")
-        cost, S, wheel = tree.best
+        self._bound, self._root_bound, self._status = bound, tree.root_bound, status
+        return self._plan(*tree.best[1:])
+
+    def known(self) -> Iterator[Plan]:
+        """Yield plans of the gaits priced so far that are not excluded, the cheapest first."""
+        for S, wheel in self.kernel.priced():
+            if gait_key(S, wheel) not in self.kernel.excluded:
+                yield self._plan(S, wheel)
+
+    def _plan(self, S: np.ndarray, wheel: np.ndarray) -> Plan:
+        """Return the plan of a priced gait, with what is proven of all gaits."""
+        kernel = self.kernel
         found = kernel.leaf(S, wheel)
         fill(kernel.program, kernel.conic, found.y)
         meta = {
             "stage": "relaxed",
             "formulation": "tight",
-            "objective": cost,
-            "bound": bound,
-            "gap": max(cost - bound, 0.0) / cost,
+            "objective": found.value,
+            "bound": min(self._bound, found.value),
+            "gap": max(found.value - self._bound, 0.0) / found.value,
             "gap_target": self.gap,
-            "status": status,
+            "status": self._status,
             "nodes": self._nodes,
-            "root_bound": tree.root_bound,
+            "root_bound": self._root_bound,
             "relaxations": kernel.qps,
             "leaves": kernel.leaves,
             "rejected_gaits": len(kernel.excluded),

@@ -159,7 +159,9 @@ def _forces(problem: Problem, stance: dict, grid: Grid) -> tuple[list[Any], list
         n, b = (cp.Variable(shape, name=f"{axis}_{e}") for axis in "nb")
         t = cp.Variable(shape, name=f"t_{e}") if friction[e][0] > 0 else np.zeros(shape)
         sides = friction_pyramid(n, t, b, *friction[e])
-        constraints += [side <= 0 for side in sides if isinstance(side, cp.Expression) and not side.is_constant()]
+        constraints += [
+            side <= 0 for side in sides if isinstance(side, cp.Expression) and not side.is_constant()
+        ]
         constraints.append(n <= problem.limits.force * (grid.spread @ stance[e].T))
         total = [total[0] + t, total[1] + b, total[2] + n]
         if e == "wheel" and region.rolling_resistance > 0:
@@ -209,7 +211,9 @@ def _centroid(program: Program, grid: Grid, sizes: Any) -> None:
         lower, upper = problem.robot.reach_lower[:, i], problem.robot.reach_upper[:, i]
         lever = program.p[i][1:] - cp.reshape(program.x[i][1:], (K, 1), order="C") @ ones
         vertex = cp.Variable((K, L), name=f"vertex{i}")
-        program.add("centroid", vertex >= (1 - swing) @ np.diag(lower), vertex <= (1 - swing) @ np.diag(upper))
+        program.add(
+            "centroid", vertex >= (1 - swing) @ np.diag(lower), vertex <= (1 - swing) @ np.diag(upper)
+        )
         away = lever - vertex
         program.add("centroid", away >= swing @ np.diag(lower), away <= swing @ np.diag(upper))
         parts = cp.Variable((K, sizes.shape[0]), name=f"centroid{i}")

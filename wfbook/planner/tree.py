@@ -5,8 +5,11 @@ variables only and a cost that no row explains: the relaxator bounds it, the bra
 boxes, the constraint handler prices what is fixed, the heuristic proposes gaits.
 """
 
+import contextlib
+import signal
+import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -55,7 +58,7 @@ class Tree:
     progress: Callable[[Progress], None] | None = None
     best: tuple[float, np.ndarray, np.ndarray] | None = None
     root_bound: float = -np.inf
-    _error: BaseException | None = None
+    error: BaseException | None = None
     _begin: float = field(default_factory=time.perf_counter)
     _shown: float = -np.inf
 
@@ -100,7 +103,8 @@ class Tree:
             }
         )
         self.variables = [
-            model.addVar(f"z{i}", "I", lb=int(low), ub=int(up)) for i, (low, up) in enumerate(zip(*root, strict=True))
+            model.addVar(f"z{i}", "I", lb=int(low), ub=int(up))
+            for i, (low, up) in enumerate(zip(*root, strict=True))
         ]
         self.cost = model.addVar("cost", "C", lb=0.0, obj=1.0)
         model.includeConshdlr(
@@ -109,20 +113,46 @@ class Tree:
         model.includeRelax(_Bound(self), "bound", "conic relaxation of a box", priority=10, freq=1)
         model.includeBranchrule(_Split(self), "split", "prefix counts and totals", 1000000, -1, 1.0)
         model.includeHeur(
-            _Gaits(self), "gaits", "common gaits, improved", "g", freq=0, timingmask=SCIP_HEURTIMING.BEFORENODE
+            _Gaits(self),
+            "gaits",
+            "common gaits, improved",
+            "g",
+            freq=0,
+            timingmask=SCIP_HEURTIMING.BEFORENODE,
         )
-        model.optimize()
+        with self._interruptible():
+            model.optimize()
         status, nodes = model.getStatus(), int(model.getNTotalNodes())
         bound = min(model.getDualbound(), self.kernel.pruned, self.incumbent)
-        if isinstance(self._error, KeyboardInterrupt):
+        if isinstance(self.error, KeyboardInterrupt):
             return "interrupted", bound, nodes
-        if self._error is not None:
-            raise self._error
+        if self.error is not None:
+            raise self.error
         if self.best is None and status in ("infeasible", "optimal", "inforunbd"):
             return "infeasible", np.inf, nodes
         if self.best is not None and self.incumbent - bound <= self.gap * self.incumbent * (1 + 1e-9):
             return "optimal", bound, nodes
         return "time limit", bound, nodes
+
+    @contextlib.contextmanager
+    def _interruptible(self) -> Iterator[None]:
+        """Let the first interrupt end the search, in the next callback, and a second one raise as ever.
+
+        An exception that Python raises between two callbacks is printed by PySCIPOpt and lost.
+        """
+        if threading.current_thread() is not threading.main_thread():
+            yield
+            return
+
+        def note(number: int, frame: Any) -> None:
+            self.error = KeyboardInterrupt()
+            signal.signal(signal.SIGINT, before)
+
+        before = signal.signal(signal.SIGINT, note)
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGINT, before)
 
     def box(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the bounds of the focus node."""
@@ -159,15 +189,22 @@ class Tree:
         gap = (self.incumbent - bound) / self.incumbent if self.best else np.inf
         self.progress(Progress(int(self.model.getNTotalNodes()), self.incumbent, bound, gap, self.elapsed))
 
-    def guarded(self, action: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        """Run a callback's body; SCIP would print and ignore an exception, so stop it and raise later."""
-        if self._error is None:
+    def guarded(
+        self, action: Callable[[], dict[str, Any]], otherwise: Any = SCIP_RESULT.DIDNOTRUN
+    ) -> dict[str, Any]:
+        """Run a callback's body; SCIP would print and ignore an exception, so stop it and raise later.
+
+        Args:
+            action: the body.
+            otherwise: what to answer from then on; each kind of callback has its own that is harmless.
+        """
+        if self.error is None:
             try:
                 return action()
             except BaseException as error:
-                self._error = error
+                self.error = error
         self.model.interruptSolve()
-        return {"result": SCIP_RESULT.DIDNOTRUN}
+        return {"result": otherwise}
 
 
 class _Bound(Relax):
@@ -231,7 +268,9 @@ class _Split(Branchrule):
             bound = max(kernel.bound(lower, upper).bound, found.bound)
             node = tree.model.createChild(0.0, bound)
             tree.model.updateNodeLowerbound(node, max(bound, tree.root_bound))
-            for variable, was_low, was_up, low, up in zip(tree.variables, *tree.box(), lower, upper, strict=True):
+            for variable, was_low, was_up, low, up in zip(
+                tree.variables, *tree.box(), lower, upper, strict=True
+            ):
                 if low > was_low:
                     tree.model.chgVarLbNode(node, variable, float(low))
                 if up < was_up:
@@ -245,9 +284,11 @@ class _Price(Conshdlr):
     def __init__(self, tree: Tree):
         self.tree = tree
 
-    def conscheck(self, constraints, solution, checkintegrality, checklprows, printreason, completely) -> dict:
+    def conscheck(
+        self, constraints, solution, checkintegrality, checklprows, printreason, completely
+    ) -> dict:
         """Check a solution's cost."""
-        return self.tree.guarded(lambda: self._check(solution))
+        return self.tree.guarded(lambda: self._check(solution), SCIP_RESULT.INFEASIBLE)
 
     def _check(self, solution: Any) -> dict[str, Any]:
         tree = self.tree
@@ -260,11 +301,11 @@ class _Price(Conshdlr):
 
     def consenfolp(self, constraints, n_useful, infeasible) -> dict[str, Any]:
         """Close the node if a single gait is left in it."""
-        return self.tree.guarded(self._enforce)
+        return self.tree.guarded(self._enforce, SCIP_RESULT.INFEASIBLE)
 
     def consenfops(self, constraints, n_useful, infeasible, objective_infeasible) -> dict[str, Any]:
         """Close the node if a single gait is left in it."""
-        return self.tree.guarded(self._enforce)
+        return self.tree.guarded(self._enforce, SCIP_RESULT.INFEASIBLE)
 
     def _enforce(self) -> dict[str, Any]:
         tree = self.tree
@@ -298,10 +339,13 @@ class _Gaits(Heur):
         tree, found = self.tree, False
         if tree.best is not None and np.isfinite(tree.kernel.leaf(*tree.best[1:]).value):
             found = tree.submit(self)
-        for value, S, wheel in improve(tree.kernel):
+
+        def late() -> bool:
+            tree.report()
+            return tree.error is not None or tree.elapsed > tree.time_limit
+
+        for value, S, wheel in improve(tree.kernel, late):
             if value < tree.incumbent:
                 tree._keep(value, S, wheel)
                 found |= tree.submit(self)
-            if tree.elapsed > tree.time_limit:
-                break
         return {"result": SCIP_RESULT.FOUNDSOL if found else SCIP_RESULT.DIDNOTFIND}

@@ -1,0 +1,197 @@
+"""The controller's program: its answer obeys the physics, and OSQP finds the answer an exact solver finds."""
+
+from dataclasses import replace
+
+import handmade
+import numpy as np
+import pytest
+
+from wfbook import simulate, wbc
+from wfbook.go1 import FOOT_RADIUS, WHEEL_RADIUS, nominal
+from wfbook.go1_dynamics import GRAVITY, Go1Dynamics
+from wfbook.qp import QuadraticProgram
+from wfbook.reference import Gains, Ground, Reference
+from wfbook.terrain import flat
+
+MODES = {
+    "four feet": ([1, 1, 1, 1], [0, 0, 0, 0]),
+    "three feet": ([1, 1, 0, 1], [0, 0, 0, 0]),
+    "diagonal": ([1, 0, 0, 1], [0, 0, 0, 0]),
+    "one foot, three wheels": ([1, 1, 1, 1], [0, 1, 1, 1]),
+    "a foot and a wheel": ([1, 0, 0, 1], [0, 1, 0, 1]),
+    "four wheels": ([1, 1, 1, 1], [1, 1, 1, 1]),
+}
+
+
+@pytest.fixture(scope="module")
+def robot() -> Go1Dynamics:
+    return Go1Dynamics()
+
+
+@pytest.fixture(scope="module")
+def ground() -> Ground:
+    return Ground.under(flat(rolling_resistance=0.01), np.zeros(4, int))
+
+
+def situation(robot: Go1Dynamics, stance, wheels, seed: int, wild: float = 1.0) -> Reference:
+    """Put the robot in a disturbed stance and ask it for something."""
+    rng = np.random.default_rng(seed)
+    wheels, stance = np.array(wheels, bool), np.array(stance, bool)
+    radii = np.where(wheels, WHEEL_RADIUS, FOOT_RADIUS)[:, None]
+    com = np.array([0.0, 0.0, 0.265]) + 0.01 * wild * rng.standard_normal(3)
+    ends = nominal()["hip_offsets"] + [0.0, 0.0, 0.265] + radii * [0.0, 0.0, 1.0]
+    ends = ends + 0.02 * wild * rng.standard_normal((4, 3))
+    qpos = robot.posture(com, 0.05 * wild * rng.standard_normal(3), ends)
+    robot.update(qpos, 0.2 * wild * rng.standard_normal(22))
+    return Reference(
+        com=com + 0.02 * wild * rng.standard_normal(3),
+        com_velocity=0.1 * wild * rng.standard_normal(3),
+        com_acceleration=0.3 * wild * rng.standard_normal(3),
+        R_wb=np.eye(3),
+        ends=ends + 0.02 * wild * rng.standard_normal((4, 3)),
+        end_velocity=0.1 * wild * rng.standard_normal((4, 3)),
+        end_acceleration=wild * rng.standard_normal((4, 3)),
+        stance=stance,
+        wheels=wheels,
+        forces=wbc.weight_share(robot, np.zeros(3), stance),
+    )
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("seed", range(3))
+def test_the_answer_obeys_the_physics(robot, ground, mode, seed):
+    ref = situation(robot, *MODES[mode], seed)
+    command = wbc.WholeBodyController(robot).tick(ref, ground)
+    assert command.solved
+    contact = wbc.contacts(robot, ground, ref.wheels)
+    forces = np.einsum("lij,lj->li", contact.basis, command.forces)
+    jacobian, drift, _ = robot.contacts(robot.contact_offsets(ground.normals, ref.wheels))
+    generalised = np.einsum("lij,li->j", jacobian, command.forces)
+    generalised[6:] += command.torques
+    residual = robot.M @ command.acceleration + robot.h - generalised
+    np.testing.assert_allclose(residual, 0.0, atol=1e-3)
+    assert np.all(np.abs(command.torques) <= robot.effort + 1e-9)
+    np.testing.assert_allclose(forces[~ref.stance], 0.0, atol=1e-3)
+
+    t, b, n = forces.T
+    least = Gains().least_force
+    assert np.all(n[ref.stance] >= least - 1e-3)
+    mu_b = np.where(ref.wheels, ground.mu_wheel, ground.mu_foot)
+    assert np.all(np.abs(b) <= mu_b * n + 1e-3)
+    assert np.all(np.abs(t[~ref.wheels]) <= (ground.mu_foot * n)[~ref.wheels] + 1e-3)
+    rolling = ref.wheels & ref.stance
+    resisting = -ground.rolling_resistance * n * np.tanh(contact.velocity[:, 0] / 0.02)
+    np.testing.assert_allclose(t[rolling], resisting[rolling], atol=1e-3)
+
+    damped = np.einsum("lij,lj->li", contact.basis, jacobian @ command.acceleration + drift)
+    damped += Gains().contact_damping * contact.velocity
+    damped[:, 1] -= np.where(ref.wheels, contact.yaw_rate * contact.velocity[:, 0], 0.0)
+    held = np.repeat(ref.stance[:, None], 3, axis=1)
+    held[:, 0] &= ~ref.wheels
+    np.testing.assert_allclose(damped[held], 0.0, atol=2e-4)
+
+
+def test_osqp_and_an_exact_solver_agree_in_closed_loop(monkeypatch):
+    pytest.importorskip("daqp")
+    seen = []
+    solve = QuadraticProgram.solve
+
+    def recording(self, *program):
+        u = solve(self, *program)
+        seen.append((program, u))
+        return u
+
+    monkeypatch.setattr(QuadraticProgram, "solve", recording)
+    errors = []
+    for plan in (handmade.trot(0.3, 5), handmade.coast(10)):
+        seen.clear()
+        simulate.run(plan, hold=0.2)
+        P_pattern, A_pattern = wbc._pattern()
+        exact = QuadraticProgram(P_pattern, A_pattern, "daqp")
+        for program, u in seen[::3]:
+            errors.append(np.abs(program[2][38:] @ (u - solve(exact, *program))).max())
+    assert np.percentile(errors, 99) <= 0.02
+    assert len(errors) > 400
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_the_sparsity_pattern_misses_nothing(robot, ground, mode):
+    P, _, A, *_ = wbc.WholeBodyController(robot).problem(situation(robot, *MODES[mode], 5), ground)
+    P_pattern, A_pattern = wbc._pattern()
+    assert not np.any(P[~P_pattern]) and not np.any(np.abs(A[~A_pattern]) > 1e-12)
+
+
+def test_standing_still_needs_the_weight_and_nothing_else(robot, ground):
+    ref = situation(robot, [1, 1, 1, 1], [0, 0, 0, 0], 0, wild=0.0)
+    command = wbc.WholeBodyController(robot).tick(ref, ground)
+    np.testing.assert_allclose(command.forces.sum(axis=0), -robot.mass * GRAVITY, atol=0.05)
+    np.testing.assert_allclose(command.forces[:, 2], command.forces[:, 2].mean(), rtol=0.02)
+    np.testing.assert_allclose(command.acceleration, 0.0, atol=0.05)
+
+
+def test_mirrored_situations_have_mirrored_answers(robot, ground):
+    """A push to the left and one to the right: the model is symmetric to a millimetre."""
+    ref = situation(robot, [1, 1, 1, 1], [0, 0, 0, 0], 0, wild=0.0)
+    answers = []
+    for side in (1.0, -1.0):
+        asked = replace(ref, com_acceleration=np.array([0.0, side, 0.0]))
+        answers.append(wbc.WholeBodyController(robot).tick(asked, ground).forces)
+    mirrored = answers[1][[1, 0, 3, 2]] * [1.0, -1.0, 1.0]
+    np.testing.assert_allclose(answers[0], mirrored, atol=1.0)
+
+
+def test_without_a_foot_nothing_is_asked_along_the_rolling_direction(robot, ground):
+    ref = situation(robot, [1, 1, 1, 1], [1, 1, 1, 1], 0, wild=0.0)
+    controller = wbc.WholeBodyController(robot)
+    still = controller.tick(ref, ground)
+    step = np.array([0.1, 0.0, 0.0])
+    ahead = controller.tick(replace(ref, com=ref.com + step, ends=ref.ends + step), ground)
+    np.testing.assert_allclose(still.torques, ahead.torques, atol=1e-3)
+    one_foot = replace(ref, wheels=np.array([False, True, True, True]))
+    pulled = controller.tick(replace(one_foot, com=ref.com + 0.1 * step), ground)
+    assert pulled.forces[:, 0].sum() > 5.0
+
+
+def test_a_rolling_wheel_may_yaw_without_being_asked_to_slide(robot, ground):
+    """Eq. 41 is the derivative of a wheel's lateral velocity, here of a robot that rolls ahead and turns."""
+    ref = situation(robot, [1, 1, 1, 1], [1, 1, 1, 1], 0, wild=0.0)
+    level = robot.posture(robot.com, np.zeros(3), ref.ends)
+    level[7::4] = 0.0  # legs upright: the axles are level
+    velocity = np.zeros(22)
+    velocity[0], velocity[5] = 0.5, 0.8
+
+    def lateral(time: float) -> np.ndarray:
+        """The wheels' lateral velocity after coasting with velocities constant in the trunk's frame."""
+        angle = velocity[5] * time
+        qpos, qvel = level.copy(), velocity.copy()
+        turned = np.array([np.cos(angle), np.sin(angle), 0.0])
+        qpos[:3] += 0.5 * time * turned
+        qpos[3:7] = np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2)
+        qvel[:3] = 0.5 * turned
+        robot.update(qpos, qvel)
+        return wbc.contacts(robot, ground, ref.wheels).velocity[:, 1]
+
+    slope = (lateral(1e-5) - lateral(-1e-5)) / 2e-5
+    robot.update(level, velocity)
+    required = wbc.fixed_wheels(wbc.contacts(robot, ground, ref.wheels), 0.0)[:, 1]
+    np.testing.assert_allclose(slope, -required, atol=1e-4)
+
+
+def test_a_failed_program_holds_then_sits_and_is_counted(robot, ground):
+    controller = wbc.WholeBodyController(robot, patience=2)
+    ref = situation(robot, *MODES["four feet"], 0)
+    good = controller.tick(ref, ground)
+    broken = replace(ref, com=np.full(3, np.nan))
+    for _ in range(2):
+        command = controller.tick(broken, ground)
+        assert not command.solved
+        np.testing.assert_array_equal(command.torques, good.torques)
+    damping = controller.tick(broken, ground).torques
+    assert damping @ robot.velocity[6:] < 0.0
+    assert controller.failures == 3
+    assert controller.tick(ref, ground).solved and np.isfinite(damping).all()
+
+
+def test_an_unknown_solver_is_refused(robot):
+    with pytest.raises(ValueError, match="solver"):
+        wbc.WholeBodyController(robot, solver="abacus")

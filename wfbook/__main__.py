@@ -1,0 +1,355 @@
+"""The command line: ``python -m wfbook run TERRAIN`` and ``python -m wfbook lab``."""
+
+import argparse
+import contextlib
+import importlib
+import json
+import math
+import re
+import signal
+import subprocess
+import sys
+import zlib
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from wfbook import terrain as ground
+from wfbook.report import ProgressLine, percent, plain, summary_table
+from wfbook.results import ResultFolder
+
+if TYPE_CHECKING:
+    from wfbook.planner import Plan, Problem, Progress
+    from wfbook.simulate import Run
+
+FILES = ("plan_relaxed.npz", "plan.npz", "run.npz", "metrics.json", "gait.png", "replay.html")
+PLANNING = {
+    "goal": None,
+    "slots": 10,
+    "feet_only": False,
+    "formulation": "tight",
+    "gap": 1e-3,
+    "time_limit": 25.0,
+}
+"""Options of planning and their defaults; no goal means ``GOAL_PER_SLOT`` ahead for each slot."""
+GOAL_PER_SLOT = 0.1
+
+OK, FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+
+class CommandError(Exception):
+    """Ends the program with one line on stderr and an exit code."""
+
+    def __init__(self, message: str, code: int) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line.
+
+    Args:
+        argv: the arguments without the program's name; by default those of the process.
+
+    Returns:
+        0 on success, 1 if the robot fell or nothing could be planned, 2 for wrong input, 130 if interrupted.
+    """
+    try:
+        parser = _parser()
+        arguments, rest = parser.parse_known_args(_join_goal(sys.argv[1:] if argv is None else argv))
+        if arguments.command is _lab:
+            return _lab(rest)
+        if rest:
+            parser.error(f"unknown: {' '.join(rest)}")
+        return arguments.command(arguments)
+    except CommandError as error:
+        print(f"wfbook: {error}", file=sys.stderr)
+        return error.code
+    except KeyboardInterrupt:
+        print("wfbook: interrupted, nothing was written", file=sys.stderr)
+        return INTERRUPTED
+
+
+class _Parser(argparse.ArgumentParser):
+    """An argument parser whose errors are one line."""
+
+    def error(self, message: str) -> NoReturn:
+        raise CommandError(f"{message} (see python -m {self.prog} --help)", WRONG_INPUT)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(
+        prog="wfbook", description="How wheeled-legged robots decide and move.", allow_abbrev=False
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=_Parser)
+
+    run = commands.add_parser(
+        "run", help="plan, control, simulate and draw on one terrain", allow_abbrev=False
+    )
+    run.set_defaults(command=_run)
+    names = ", ".join(ground.BUILTIN_NAMES)
+    run.add_argument("terrain", metavar="TERRAIN", nargs="?", help=f"{names}, or a terrain FILE.json")
+    planning = run.add_argument_group("planning")
+    planning.add_argument(
+        "--goal", type=_goal, metavar="X,Y", help="where to go, metres (0.1 m ahead a slot)"
+    )
+    planning.add_argument("--slots", type=_whole(1), help="0.3 s swing slots (10)")
+    planning.add_argument("--feet-only", action="store_true", default=None, help="plan without wheels")
+    planning.add_argument(
+        "--formulation", choices=("tight", "paper"), help="the program to search: tight, or the paper's big-M"
+    )
+    planning.add_argument("--gap", type=_number(0.0, above=True), help="relative gap to prove (0.001)")
+    planning.add_argument(
+        "--time-limit", type=_number(0.0, above=True), metavar="S", help="of the search (25 s)"
+    )
+    planning.add_argument("--plan", metavar="FILE", help="execute this plan file instead of planning")
+    execution = run.add_argument_group("execution")
+    execution.add_argument("--delay-ms", type=_whole(0), default=9, help="torque delay (9 ms)")
+    execution.add_argument(
+        "--state", choices=("estimated", "true"), default="true", help="what the controller sees"
+    )
+    execution.add_argument("--seed", type=_whole(0), default=0, help="of everything random (0)")
+    output = run.add_argument_group("output")
+    output.add_argument("--out", metavar="DIR", help="folder for the results (runs/TERRAIN)")
+    output.add_argument("--json", action="store_true", help="print the metrics as JSON instead of a table")
+
+    lab = commands.add_parser("lab", help="open the notebooks in JupyterLab", allow_abbrev=False)
+    lab.set_defaults(command=_lab)
+    lab.epilog = "Other options are passed on to JupyterLab."
+    return parser
+
+
+def _join_goal(argv: Sequence[str]) -> list[str]:
+    """Write ``--goal X Y`` and ``--goal X,Y`` as ``--goal=X,Y``, which argparse reads with any sign."""
+    words = list(argv)
+    if "--goal" in words:
+        i = words.index("--goal")
+        n = 2 if "," in "".join(words[i + 1 : i + 2]) else 3
+        words[i : i + n] = ["--goal=" + ",".join(words[i + 1 : i + n])]
+    return words
+
+
+def _goal(text: str) -> tuple[float, float]:
+    try:
+        x, y = (float(part) for part in text.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"must be two numbers X Y, is {text!r}") from None
+    if not (math.isfinite(x) and math.isfinite(y)):
+        raise argparse.ArgumentTypeError(f"must be finite, is {text!r}")
+    return x, y
+
+
+def _whole(least: int) -> Callable[[str], int]:
+    def whole(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            raise argparse.ArgumentTypeError(f"must be a whole number, is {text!r}") from None
+        if value < least:
+            raise argparse.ArgumentTypeError(f"must be at least {least}, is {text}")
+        return value
+
+    return whole
+
+
+def _number(least: float, above: bool = False) -> Callable[[str], float]:
+    def number(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            raise argparse.ArgumentTypeError(f"must be a finite number, is {text!r}")
+        if value < least or (above and value == least):
+            raise argparse.ArgumentTypeError(
+                f"must be {'above' if above else 'at least'} {least:g}, is {text}"
+            )
+        return value
+
+    return number
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    """Plan (or load a plan), execute, write the results and tell what happened."""
+    if arguments.state == "estimated":
+        raise CommandError(
+            "--state estimated: there is no state estimator yet, use --state true", WRONG_INPUT
+        )
+    plan = problem = None
+    if arguments.plan is not None:
+        plan = _given_plan(arguments)
+    else:
+        problem = _problem(arguments)
+    name = (plan or problem).terrain.name
+    target = arguments.out or Path("runs") / _folder_name(name)
+    with contextlib.ExitStack() as stack:
+        try:
+            folder = stack.enter_context(ResultFolder(target, FILES))
+        except OSError as error:
+            raise CommandError(
+                f"--out {str(target)!r} can't be written: {error.strerror}", WRONG_INPUT
+            ) from None
+        _load("wfbook.simulate", "wfbook.view.figures", "wfbook.view.replay")
+        relaxed = None
+        if plan is None:
+            relaxed, plan = _planned(problem, arguments)
+        run = _executed(plan, arguments)
+        metrics = _write(folder.path, relaxed, plan, run)
+        folder.publish()
+    print(json.dumps(metrics, indent=1) if arguments.json else summary_table(metrics, folder.target))
+    if metrics["fell"]:
+        raise CommandError(f"the robot fell at {metrics['fall_time_s']:.2f} s", FAILED)
+    return OK if metrics["upright"] else FAILED
+
+
+def _given_plan(arguments: argparse.Namespace) -> "Plan":
+    """Load the plan file of ``--plan``, which leaves no option of planning and no other terrain."""
+    for option in PLANNING:
+        if getattr(arguments, option) is not None:
+            raise CommandError(f"--{option.replace('_', '-')} has no effect with --plan", WRONG_INPUT)
+    _load("wfbook.planner")
+    from wfbook.planner import Plan
+
+    with _wrong_input():
+        try:
+            plan = Plan.load(arguments.plan)
+        except (NotImplementedError, RuntimeError, zlib.error) as error:
+            # What zipfile raises where a damaged header asks for encryption or an unknown compression.
+            raise ValueError(f"{arguments.plan}: not a plan file, or damaged ({error})") from None
+        asked = arguments.terrain and ground.named_or_file(arguments.terrain)
+    if asked and asked != plan.terrain:
+        raise CommandError(
+            f"plan file {arguments.plan!r} was made for terrain {plan.terrain.name!r}, "
+            f"which is not {arguments.terrain!r}; leave TERRAIN out to take the plan's",
+            WRONG_INPUT,
+        )
+    return plan
+
+
+def _problem(arguments: argparse.Namespace) -> "Problem":
+    if arguments.terrain is None:
+        known = ", ".join(ground.BUILTIN_NAMES)
+        raise CommandError(f"TERRAIN is missing: one of {known}, or a file ending in .json", WRONG_INPUT)
+    with _wrong_input():
+        terrain = ground.named_or_file(arguments.terrain)
+    for option, default in PLANNING.items():
+        if getattr(arguments, option) is None:
+            setattr(arguments, option, default)
+    _load("wfbook.planner")
+    from wfbook.planner import Problem
+
+    with _wrong_input():
+        return Problem(
+            terrain,
+            goal=arguments.goal or (GOAL_PER_SLOT * arguments.slots, 0.0),
+            slots=arguments.slots,
+            end_effectors=("foot",) if arguments.feet_only else ("foot", "wheel"),
+        )
+
+
+def _load(*modules: str) -> None:
+    """Import modules with signals held back: broken into, extension modules end in an ImportError."""
+    held = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    try:
+        for module in modules:
+            importlib.import_module(module)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, held)
+
+
+@contextlib.contextmanager
+def _wrong_input() -> Iterator[None]:
+    """Turn what is wrong with a file or a value into one line and exit code 2."""
+    try:
+        yield
+    except ValueError as error:
+        raise CommandError(" ".join(str(error).split()), WRONG_INPUT) from None
+    except OSError as error:
+        text = f"{error.filename!r}: {error.strerror}" if error.filename else str(error)
+        raise CommandError(text, WRONG_INPUT) from None
+
+
+def _folder_name(terrain_name: str) -> str:
+    """A terrain's name as a folder's: what is not a letter, a digit, a dash or a dot becomes a dash."""
+    return re.sub(r"[^\w.-]+", "-", terrain_name).strip("-.") or "terrain"
+
+
+def _planned(problem: "Problem", arguments: argparse.Namespace) -> "tuple[Plan, Plan]":
+    """Search for the best plan that can be executed.
+
+    Returns:
+        The relaxed plan and the polished one.
+    """
+    from wfbook import planner
+
+    with ProgressLine(sys.stderr) as line:
+
+        def show(now: "Progress") -> None:
+            incumbent = f"{now.incumbent:.4f}" if math.isfinite(now.incumbent) else "none"
+            line.show(
+                f"planning {now.time:6.1f} s  nodes {now.nodes:6d}  incumbent {incumbent}  "
+                f"bound {now.bound:.4f}  gap {percent(now.gap)}"
+            )
+
+        try:
+            return planner.solve_executable(
+                problem,
+                formulation=arguments.formulation,
+                gap=arguments.gap,
+                time_limit=arguments.time_limit,
+                progress=show,
+            )
+        except (planner.InfeasibleError, planner.NoPlanError) as error:
+            raise CommandError(" ".join(str(error).split()), FAILED) from None
+
+
+def _executed(plan: "Plan", arguments: argparse.Namespace) -> "Run":
+    from wfbook import simulate
+
+    # A plan from elsewhere may be well-formed and yet ask for what the robot can't do.
+    given = _wrong_input() if arguments.plan else contextlib.nullcontext()
+    with given, ProgressLine(sys.stderr) as line:
+        return simulate.run(
+            plan,
+            delay=arguments.delay_ms / 1000.0,
+            state=arguments.state,
+            seed=arguments.seed,
+            progress=lambda now, end: line.show(f"simulating {now:5.2f} of {end:.2f} s"),
+        )
+
+
+def _write(folder: Path, relaxed: "Plan | None", plan: "Plan", run: "Run") -> dict[str, Any]:
+    """Write the results of a run.
+
+    Returns:
+        The metrics as they stand in ``metrics.json``.
+    """
+    from wfbook.view import figures, replay
+
+    metrics = plain(run.metrics)
+    if relaxed is not None:
+        relaxed.save(folder / "plan_relaxed.npz")
+    plan.save(folder / "plan.npz")
+    run.save(folder / "run.npz")
+    (folder / "metrics.json").write_text(json.dumps(metrics, indent=1, allow_nan=False) + "\n")
+    (folder / "gait.png").write_bytes(figures.gait(plan).png())
+    replay.save(run, folder / "replay.html")
+    return metrics
+
+
+def _lab(options: Sequence[str]) -> int:
+    """Open the notebooks; ends when JupyterLab does."""
+    notebooks = Path(__file__).parent.parent / "notebooks"
+    if not notebooks.is_dir():
+        raise CommandError(f"no notebooks at {str(notebooks)!r}: install with pip install -e .", FAILED)
+    return subprocess.call([sys.executable, "-m", "jupyterlab", str(notebooks), *options])
+
+
+def _end(*_: object) -> NoReturn:
+    """Leave through the cleaning up that ``with`` does, which an unhandled SIGTERM would skip."""
+    sys.exit(128 + signal.SIGTERM)
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGTERM, _end)
+    sys.exit(main())

@@ -1,0 +1,218 @@
+"""The Unitree Go1 whose legs end in a foot *and* a passive wheel, simulated by MuJoCo.
+
+Both end effectors sit on the calf's end, concentric. Only one of them collides at a time: paper A's
+mechanism switches "nearly instantly during the swing phase", and so does :meth:`Go1.set_end_effector`.
+"""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+
+from wfbook.modes import END_EFFECTORS, LEGS
+
+if TYPE_CHECKING:
+    from wfbook.terrain import Region, Terrain
+
+ASSETS = Path(__file__).resolve().parent.parent / "assets" / "go1"
+FOOT_RADIUS = 0.02
+WHEEL_RADIUS = 0.04
+WHEEL_HALF_WIDTH = 0.012
+RADII = np.array([FOOT_RADIUS, WHEEL_RADIUS])
+"""Height of the leg's end above its contact point, by end effector (0 foot, 1 wheel)."""
+
+_LINK = 0.213
+_HIP = np.array([0.1881, 0.04675, 0.0])
+_ABDUCTION = 0.08
+_THICKNESS = 0.5
+_LOADED = 1.0
+
+
+class LoadedLegError(ValueError):
+    """The end effector of a leg that carries load cannot be switched."""
+
+
+def nominal() -> dict[str, np.ndarray | float]:
+    """Return what a planner needs to know of the robot, from ``assets/go1/nominal.json``.
+
+    Returns:
+        ``mass``; ``com_height`` above the ground; ``inertia`` ``(3, 3)`` about the CoM in the nominal
+        stance; and, relative to the CoM: ``hip_offsets`` ``(4, 3)`` the nominal contact points, ``hips``
+        ``(4, 3)`` where the thighs turn, ``trunk`` ``(3,)`` the trunk's origin. ``joint_angles`` ``(12,)``.
+    """
+    values = json.loads((ASSETS / "nominal.json").read_text())
+    return {key: np.array(value) if isinstance(value, list) else value for key, value in values.items()}
+
+
+def leg_angles(leg: int, end_b: np.ndarray) -> np.ndarray:
+    """Return hip, thigh and calf angles that put a leg's end at a point (knee pointing back).
+
+    Args:
+        leg: index in :data:`wfbook.modes.LEGS`.
+        end_b: ``(3,)`` the end in the trunk's frame.
+
+    Raises:
+        ValueError: when the point is out of reach.
+    """
+    front, left = (1, -1)[leg // 2], (1, -1)[leg % 2]
+    x, y, z = end_b - _HIP * [front, left, 1.0]
+    depth = np.sqrt(max(y * y + z * z - _ABDUCTION**2, 0.0))
+    reach = np.hypot(x, depth)
+    if not abs(reach / (2 * _LINK)) <= 1.0 or y * y + z * z < _ABDUCTION**2:
+        raise ValueError(f"{LEGS[leg]} can't reach {np.round(end_b, 3).tolist()} (trunk frame)")
+    hip = np.arctan2(z, y) - np.arctan2(-depth, left * _ABDUCTION)
+    hip = (hip + np.pi) % (2 * np.pi) - np.pi
+    calf = -2 * np.arccos(reach / (2 * _LINK))
+    return np.array([hip, np.arctan2(-x, depth) - calf / 2, calf])
+
+
+class Go1:
+    """A Go1 on a terrain: MuJoCo's model and data, and what a controller and a log need of them.
+
+    The terrain brings friction and rolling resistance. Each region becomes two geoms of the same shape,
+    one for feet and hulls, one for wheels, because one MuJoCo geom has one friction for all it meets.
+
+    Args:
+        terrain: to stand on.
+        joint_friction: dry friction of every motor's joint, N m. The URDF says 0.2.
+        trunk_mass_scale: multiplies the trunk's mass and inertia.
+
+    Attributes:
+        model, data: MuJoCo's.
+        terrain: as given.
+        joint_names: of ``qpos[7:]``, in order.
+    """
+
+    def __init__(
+        self, terrain: "Terrain", joint_friction: float = 0.0, trunk_mass_scale: float = 1.0
+    ) -> None:
+        spec = mujoco.MjSpec.from_file(str(ASSETS / "go1.xml"))
+        for index, region in enumerate(terrain.regions):
+            _add_region(spec, index, region)
+        self.terrain = terrain
+        self.model = model = spec.compile()
+        self.data = mujoco.MjData(model)
+        self.joint_names = [model.joint(i).name for i in range(1, model.njnt)]
+        motors = [
+            model.joint(f"{leg}_{part}_joint").dofadr[0] for leg in LEGS for part in ("hip", "thigh", "calf")
+        ]
+        model.dof_frictionloss[motors] = joint_friction
+        trunk = model.body("trunk").id
+        model.body_mass[trunk] *= trunk_mass_scale
+        model.body_inertia[trunk] *= trunk_mass_scale
+        mujoco.mj_setConst(model, self.data)
+        names = [[f"{leg}_{kind}" for kind in END_EFFECTORS] for leg in LEGS]
+        self._geoms = np.array([[model.geom(name).id for name in pair] for pair in names])
+        self._leg_of_geom = np.full(model.ngeom, -1)
+        self._leg_of_geom[self._geoms] = np.arange(4)[:, None]
+        self._bits = model.geom_contype[self._geoms].copy()
+        self._robot_geom = model.geom_bodyid != 0
+        self._trunk = trunk
+        self._sites = np.array([model.site(f"{leg}_end").id for leg in LEGS])
+
+    def reset(self, qpos: np.ndarray, end_effectors: np.ndarray) -> None:
+        """Put the robot at rest.
+
+        Args:
+            qpos: ``(23,)``.
+            end_effectors: ``(4,)`` 0 foot, 1 wheel.
+        """
+        mujoco.mj_resetData(self.model, self.data)
+        self.data.qpos[:] = qpos
+        self.model.geom_contype[self._geoms] = 0
+        for leg, kind in enumerate(end_effectors):
+            self._switch(leg, int(kind))
+        mujoco.mj_forward(self.model, self.data)
+
+    def step(self, torques: np.ndarray) -> None:
+        """Simulate one time step (1 ms) with ``(12,)`` motor torques, cut at the motors' limits."""
+        self.data.ctrl[:] = torques
+        mujoco.mj_step(self.model, self.data)
+
+    def push(self, force: np.ndarray) -> None:
+        """Pull at the trunk's centre of mass with a force ``(3,)`` in the world until told otherwise."""
+        self.data.xfrc_applied[self._trunk, :3] = force
+
+    def end_effector(self, leg: str) -> str:
+        """Return what a leg stands on: ``"foot"`` or ``"wheel"``."""
+        return END_EFFECTORS[self.end_effectors[LEGS.index(leg)]]
+
+    @property
+    def end_effectors(self) -> np.ndarray:
+        """``(4,)`` int8: 0 foot, 1 wheel."""
+        return (self.model.geom_contype[self._geoms[:, 1]] != 0).astype(np.int8)
+
+    def set_end_effector(self, leg: str, kind: str) -> None:
+        """Make a leg stand on its foot or on its wheel from now on.
+
+        Args:
+            leg: one of :data:`wfbook.modes.LEGS`.
+            kind: ``"foot"`` or ``"wheel"``.
+
+        Raises:
+            LoadedLegError: the leg carries more than 1 N.
+            ValueError: unknown leg or end effector.
+        """
+        if leg not in LEGS:
+            raise ValueError(f"leg: {leg!r} is none of {', '.join(LEGS)}")
+        if kind not in END_EFFECTORS:
+            raise ValueError(f"kind: {kind!r} is none of {', '.join(END_EFFECTORS)}")
+        index = LEGS.index(leg)
+        load = np.linalg.norm(self.contact_forces()[index])
+        if kind != self.end_effector(leg) and load > _LOADED:
+            raise LoadedLegError(f"{leg} carries {load:.0f} N: lift it before you switch to the {kind}")
+        self._switch(index, END_EFFECTORS.index(kind))
+
+    def _switch(self, leg: int, kind: int) -> None:
+        """Let one geom of a leg collide and the other not (both are compiled as colliding)."""
+        self.model.geom_contype[self._geoms[leg, kind]] = self._bits[leg, kind]
+        self.model.geom_contype[self._geoms[leg, 1 - kind]] = 0
+
+    @property
+    def centres(self) -> np.ndarray:
+        """``(4, 3)`` centres of the feet and wheels."""
+        return self.data.site_xpos[self._sites].copy()
+
+    def contact_forces(self) -> np.ndarray:
+        """Return the force of the ground on each leg's end effector, world frame, ``(4, 3)``."""
+        data, forces = self.data, np.zeros((4, 3))
+        contact = data.contact
+        for i in range(data.ncon):
+            first, second = contact.geom[i]
+            leg = self._leg_of_geom[second] if self._robot_geom[second] else self._leg_of_geom[first]
+            start = contact.efc_address[i]
+            if leg >= 0 and start >= 0:
+                force = contact.frame[i].reshape(3, 3).T @ data.efc_force[start : start + 3]
+                forces[leg] += (
+                    force if self._robot_geom[second] else -force
+                )  # the frame points to the second geom
+        return forces
+
+    def touches_with_hull(self) -> bool:
+        """Whether anything but feet and wheels touches the ground."""
+        return (
+            bool(np.any(self._leg_of_geom[self.data.contact.geom].max(axis=1) < 0))
+            if self.data.ncon
+            else False
+        )
+
+
+def _add_region(spec: mujoco.MjSpec, index: int, region: "Region") -> None:
+    """Add a region to a model as the top of an upright prism, once for feet and once for wheels."""
+    top = region.vertices - region.vertices.mean(axis=0)
+    prism = np.vstack([top, top - [0.0, 0.0, _THICKNESS]])
+    spec.add_mesh(name=f"region_{index}", uservert=prism.ravel())
+    for kind, bit, mu in (("foot", 1, region.mu_foot), ("wheel", 2, region.mu_wheel_lateral)):
+        rolling = region.rolling_resistance * WHEEL_RADIUS if kind == "wheel" else 0.0
+        spec.worldbody.add_geom(
+            name=f"region_{index}_{kind}",
+            type=mujoco.mjtGeom.mjGEOM_MESH,
+            meshname=f"region_{index}",
+            pos=region.vertices.mean(axis=0),
+            contype=0,
+            conaffinity=bit,
+            condim=6 if rolling > 0 else 3,
+            friction=[mu, 0.0, rolling],
+        )

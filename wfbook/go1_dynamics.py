@@ -1,0 +1,244 @@
+"""The Go1's equations of motion in Pinocchio, from the MJCF that MuJoCo simulates.
+
+The whole-body controller works with 18 of the robot's 22 velocities: the trunk's six (linear, then angular,
+both in the trunk's frame, as Pinocchio has them) and three joints a leg in the order of
+:data:`wfbook.modes.LEGS`. The four wheels spin freely, no motor turns them, so they are eliminated.
+
+MuJoCo and Pinocchio agree on these dynamics to rounding, once their conventions are translated:
+
+=====================  ==========================  =======================
+what                   MuJoCo                      Pinocchio
+=====================  ==========================  =======================
+quaternion             w x y z                     x y z w
+linear velocity        trunk's origin, in world    the same, in the trunk's frame
+angular velocity       in the trunk's frame        the same
+linear acceleration    derivative of the above     derivative of the above
+order of joints        of the file                 found by name
+=====================  ==========================  =======================
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from wfbook.go1 import ASSETS, FOOT_RADIUS, WHEEL_HALF_WIDTH, WHEEL_RADIUS, leg_angles
+from wfbook.modes import LEGS
+
+GRAVITY = np.array([0.0, 0.0, -9.81])
+MOTORS = np.array([6 + 4 * leg + part for leg in range(4) for part in range(3)])
+"""Indices of the twelve motors' joints in MuJoCo's velocity (the fourth joint of a leg is its wheel)."""
+
+_WHEELS = np.array([9 + 4 * leg for leg in range(4)])
+_YZX, _ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])
+_KEPT = np.concatenate([np.arange(6), MOTORS])
+
+
+def skew(vectors: np.ndarray) -> np.ndarray:
+    """Return the matrices ``[v]×`` with ``[v]× u = v × u``, shape ``(..., 3, 3)`` of ``(..., 3)``."""
+    matrices = np.zeros((*np.shape(vectors), 3))
+    matrices[..., 2, 1] = vectors[..., 0]
+    matrices[..., 0, 2] = vectors[..., 1]
+    matrices[..., 1, 0] = vectors[..., 2]
+    return matrices - np.swapaxes(matrices, -1, -2)
+
+
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return ``a × b`` of ``(..., 3)`` arrays; for a handful of vectors three times quicker than NumPy's."""
+    return a[..., _YZX] * b[..., _ZXY] - a[..., _ZXY] * b[..., _YZX]
+
+
+class Go1Dynamics:
+    """Mass matrix, bias forces and contact kinematics at one state.
+
+    Call :meth:`update`, then read the attributes. ``w`` in a name is the world frame, ``b`` the trunk's;
+    vectors without a frame are in the world's.
+
+    Attributes:
+        mass: of the robot with its wheels.
+        R_wb: ``(3, 3)`` the trunk's orientation.
+        trunk_position: ``(3,)``.
+        joint_angles: ``(12,)`` of the motors.
+        velocity: ``(18,)`` generalised velocity.
+        M: ``(18, 18)`` mass matrix, wheels eliminated.
+        h: ``(18,)`` Coriolis, centrifugal and gravity forces, wheels eliminated.
+        M_full: ``(22, 22)`` mass matrix in MuJoCo's order of joints, Pinocchio's base velocity.
+        h_full: ``(22,)`` bias likewise.
+        com: ``(3,)`` centre of mass; ``com_velocity``, ``com_drift``: its velocity, and its acceleration when
+            the generalised acceleration is zero.
+        com_jacobian: ``(3, 18)``.
+        centres: ``(4, 3)`` centre of foot and wheel; ``centre_velocity``, ``centre_drift`` likewise.
+        centre_jacobian: ``(4, 3, 18)``.
+        calf_omega: ``(4, 3)`` angular velocity of the calves; ``calf_alpha_drift`` likewise.
+        calf_jacobian: ``(4, 3, 18)`` of the calves' angular velocity.
+        axles: ``(4, 3)`` unit vectors along the wheels' axles, to the robot's left.
+    """
+
+    def __init__(self, path: Path = ASSETS / "go1.xml") -> None:
+        self.model = pin.buildModelFromMJCF(str(path))
+        self.data = self.model.createData()
+        names = [f"{leg}_{part}_joint" for leg in LEGS for part in ("hip", "thigh", "calf", "wheel")]
+        joints = [self.model.getJointId(name) for name in names]
+        self._v_index = np.array([*range(6), *(self.model.idx_vs[j] for j in joints)])
+        self._q_index = np.array([*range(7), *(self.model.idx_qs[j] for j in joints)])
+        self._calves, self._wheels = joints[2::4], joints[3::4]
+        self._mask = np.zeros((4, 1, 22))
+        self._mask[:, :, :6] = 1.0
+        for leg in range(4):
+            self._mask[leg, :, 6 + 4 * leg : 9 + 4 * leg] = 1.0
+        self.mass = pin.computeTotalMass(self.model)
+        self.effort = np.array([self.model.effortLimit[i] for i in self._v_index[MOTORS]])
+        self.lower = self.model.lowerPositionLimit[self._q_index[MOTORS + 1]]
+        self.upper = self.model.upperPositionLimit[self._q_index[MOTORS + 1]]
+
+    def state(self, qpos: np.ndarray, qvel: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Translate a MuJoCo state, ``(23,)`` and ``(22,)``, to Pinocchio's."""
+        q, v = np.empty(23), np.empty(22)
+        q[self._q_index] = qpos
+        q[3:7] = qpos[[4, 5, 6, 3]]
+        R_wb = pin.Quaternion(q[3:7]).toRotationMatrix()
+        v[self._v_index] = qvel
+        v[:3] = R_wb.T @ qvel[:3]
+        return q, v
+
+    def acceleration(self, qpos: np.ndarray, qvel: np.ndarray, qacc: np.ndarray) -> np.ndarray:
+        """Translate a MuJoCo acceleration ``(22,)`` to Pinocchio's base, joints in MuJoCo's order."""
+        q, v = self.state(qpos, qvel)
+        a = np.array(qacc, dtype=float)
+        a[:3] = pin.Quaternion(q[3:7]).toRotationMatrix().T @ qacc[:3] - cross(v[3:6], v[:3])
+        return a
+
+    def update(self, qpos: np.ndarray, qvel: np.ndarray) -> None:
+        """Compute everything at a MuJoCo state.
+
+        Args:
+            qpos: ``(23,)`` position, quaternion (w x y z), joints.
+            qvel: ``(22,)`` linear velocity in the world, angular in the trunk's frame, joints.
+        """
+        model, data = self.model, self.data
+        q, v = self.state(qpos, qvel)
+        pin.crba(model, data, q, pin.Convention.WORLD)
+        pin.nonLinearEffects(model, data, q, v)
+        pin.computeJointJacobiansTimeVariation(model, data, q, v)
+        order = self._v_index
+        v = v[order]
+        upper = data.M[np.ix_(order, order)]
+        self.M_full = np.triu(upper) + np.triu(upper, 1).T
+        self.h_full = data.nle[order]
+        self.velocity = v[_KEPT]
+        self.joint_angles = np.asarray(qpos)[7 + (MOTORS - 6)]
+        self.trunk_position = np.array(qpos[:3], dtype=float)
+        self.R_wb = np.array(data.oMi[1].rotation)
+        self._eliminate_wheels()
+        self._centre_of_mass()
+        self._legs(np.array(data.J)[:, order], np.array(data.dJ)[:, order], v)
+
+    def _eliminate_wheels(self) -> None:
+        """Solve the wheels' own rows, in which no torque acts, for their spin and insert it in the others."""
+        coupling = self.M_full[np.ix_(_KEPT, _WHEELS)] / self.M_full[_WHEELS, _WHEELS]
+        self.M = self.M_full[np.ix_(_KEPT, _KEPT)] - coupling @ self.M_full[np.ix_(_WHEELS, _KEPT)]
+        self.h = self.h_full[_KEPT] - coupling @ self.h_full[_WHEELS]
+
+    def _centre_of_mass(self) -> None:
+        """Read the centre of mass off the trunk's rows: they are Newton's law of the whole robot."""
+        M, m = self.M_full, self.mass
+        c_b = np.array([M[1, 5], M[2, 3], M[0, 4]]) / m  # M[:3, 3:6] = -m [c]×
+        self.com = self.trunk_position + self.R_wb @ c_b
+        self.com_jacobian = self.R_wb @ M[:3][:, _KEPT] / m
+        self.com_velocity = self.com_jacobian @ self.velocity
+        self.com_drift = self.R_wb @ self.h_full[:3] / m + GRAVITY
+        self._c_b = c_b
+
+    def _legs(self, J: np.ndarray, dJ: np.ndarray, v: np.ndarray) -> None:
+        """Fill in the kinematics of the legs' ends from the Jacobians at the world's origin."""
+        self.centres = np.array([self.data.oMi[j].translation for j in self._wheels])
+        self.axles = np.array([self.data.oMi[j].rotation[:, 1] for j in self._calves])
+        lever = skew(self.centres)
+        angular = J[3:] * self._mask
+        linear = J[:3] * self._mask - lever @ angular
+        moving = self._mask[:, 0] * v
+        a_origin, alpha = moving @ dJ[:3].T, moving @ dJ[3:].T
+        omega = moving @ J[3:].T
+        velocity = np.einsum("lij,j->li", linear, v)
+        self.centre_jacobian, self.calf_jacobian = linear[:, :, _KEPT], angular[:, :, _KEPT]
+        self.centre_velocity, self.calf_omega, self.calf_alpha_drift = velocity, omega, alpha
+        self.centre_drift = a_origin + cross(alpha, self.centres) + cross(omega, velocity)
+
+    def contact_offsets(self, normals: np.ndarray, wheels: np.ndarray) -> np.ndarray:
+        """Return the vectors from the legs' ends to the points that touch a plane.
+
+        The foot is a sphere; the wheel is an ellipsoid of revolution about its axle, whose lowest
+        point does not depend on its spin but moves with its camber.
+
+        Args:
+            normals: ``(4, 3)`` unit normals of the ground.
+            wheels: ``(4,)`` bool, whether the leg stands on its wheel.
+
+        Returns:
+            ``(4, 3)``.
+        """
+        flat = WHEEL_RADIUS**2 - WHEEL_HALF_WIDTH**2
+        camber = np.sum(normals * self.axles, axis=1, keepdims=True)
+        wheel = -(WHEEL_RADIUS**2 * normals - flat * camber * self.axles) / np.sqrt(
+            WHEEL_RADIUS**2 - flat * camber**2
+        )
+        return np.where(np.asarray(wheels)[:, None], wheel, -FOOT_RADIUS * normals)
+
+    def contacts(self, offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return Jacobians, drifts and velocities of the points at ``offsets`` from the legs' ends.
+
+        The point is the calf's matter that touches the ground *now*. A foot rolls over its own
+        roundness: it is the next matter that touches next, so the offset stays put in the world while
+        the calf turns, and the drift has no centripetal part. A wheel's matter moves with the spin too,
+        but only along the rolling direction, which no stance constraint uses.
+
+        Args:
+            offsets: ``(4, 3)``.
+
+        Returns:
+            ``(4, 3, 18)``, ``(4, 3)``, ``(4, 3)``.
+        """
+        jacobian = self.centre_jacobian - skew(offsets) @ self.calf_jacobian
+        drift = self.centre_drift + cross(self.calf_alpha_drift, offsets)
+        return jacobian, drift, self.centre_velocity + cross(self.calf_omega, offsets)
+
+    def composite_inertia(self) -> np.ndarray:
+        """Return the whole robot's inertia about its centre of mass, ``(3, 3)``, in the trunk's frame."""
+        c = self._c_b
+        return self.M_full[3:6, 3:6] - self.mass * (np.dot(c, c) * np.eye(3) - np.outer(c, c))
+
+    def hips(self) -> np.ndarray:
+        """Return where the thighs turn when abduction is zero, ``(4, 3)`` in the trunk's frame."""
+        place = self.model.jointPlacements
+        ids = [[self.model.getJointId(f"{leg}_{part}_joint") for part in ("hip", "thigh")] for leg in LEGS]
+        return np.array([place[hip].translation + place[thigh].translation for hip, thigh in ids])
+
+    def posture(self, com: np.ndarray, rpy: np.ndarray, centres: np.ndarray) -> np.ndarray:
+        """Return the configuration with this CoM, trunk orientation and leg ends.
+
+        The CoM moves a little as the legs fold, so the trunk is shifted until it fits.
+
+        Args:
+            com: ``(3,)``.
+            rpy: ``(3,)`` roll, pitch, yaw of the trunk.
+            centres: ``(4, 3)`` centres of the feet or wheels.
+
+        Returns:
+            ``(23,)`` MuJoCo configuration, wheels at zero.
+
+        Raises:
+            ValueError: when a leg cannot reach.
+        """
+        R_wb = pin.rpy.rpyToMatrix(*np.asarray(rpy, float))
+        x, y, z, w = pin.Quaternion(R_wb).coeffs()
+        qpos = np.zeros(23)
+        qpos[:3] = com
+        qpos[3:7] = w, x, y, z
+        for _ in range(30):
+            for leg in range(4):
+                qpos[7 + 4 * leg : 10 + 4 * leg] = leg_angles(leg, R_wb.T @ (centres[leg] - qpos[:3]))
+            self.update(qpos, np.zeros(22))
+            qpos[:3] += com - self.com
+            if np.abs(com - self.com).max() < 1e-12:
+                break
+        return qpos

@@ -1,0 +1,105 @@
+"""Chapter 6: what the whole-body controller is asked, and how hard it tries."""
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from wfbook.terrain import Terrain
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Gains and weights. A PD gain is an acceleration per unit of error (eqs 34–36).
+
+    Attributes:
+        com_kp, com_kd: ``(3,)`` of the centre of mass.
+        attitude_kp, attitude_kd: ``(3,)`` of the trunk's orientation. They are high because dry friction in
+            the joints acts on the attitude most.
+        wheel_kp, wheel_kd: of a rolling wheel's place below the robot.
+        swing_kp, swing_kd: of a swinging leg's end.
+        com_weight, attitude_weight, wheel_weight, swing_weight: of the tasks in eq. 38. On two legs
+            the robot can't hold both its CoM and its attitude. An error of the CoM grows until other legs
+            land, a tilt does not; hence the CoM's large weight: the trunk tilts by a degree and gives the
+            swinging legs their swing.
+        contact_damping: at which standing feet come to rest, 1/s.
+        least_force: with which a standing leg presses on the ground at least, N; it keeps what it has.
+        force_weight: price on λ, per N².
+        acceleration_weight: price on q̈.
+    """
+
+    com_kp: np.ndarray = field(default_factory=lambda: np.array([200.0, 200.0, 400.0]))
+    com_kd: np.ndarray = field(default_factory=lambda: np.array([28.0, 28.0, 40.0]))
+    attitude_kp: np.ndarray = field(default_factory=lambda: np.array([800.0, 800.0, 400.0]))
+    attitude_kd: np.ndarray = field(default_factory=lambda: np.array([56.0, 56.0, 40.0]))
+    wheel_kp: float = 60.0
+    wheel_kd: float = 16.0
+    swing_kp: float = 400.0
+    swing_kd: float = 40.0
+    com_weight: float = 1000.0
+    attitude_weight: float = 3.0
+    wheel_weight: float = 3.0
+    swing_weight: float = 10.0
+    contact_damping: float = 40.0
+    least_force: float = 3.0
+    force_weight: float = 1e-3
+    acceleration_weight: float = 1e-4
+
+
+@dataclass(frozen=True)
+class Ground:
+    """What each leg stands on, or will land on.
+
+    Attributes:
+        normals: ``(4, 3)`` unit normals n.
+        tangents: ``(4, 3)`` unit rolling directions t.
+        mu_foot: ``(4,)`` friction coefficient of a foot.
+        mu_wheel: ``(4,)`` of a wheel along its axle.
+        rolling_resistance: ``(4,)`` resisting over normal force.
+    """
+
+    normals: np.ndarray
+    tangents: np.ndarray
+    mu_foot: np.ndarray
+    mu_wheel: np.ndarray
+    rolling_resistance: np.ndarray
+
+    @classmethod
+    def under(cls, terrain: "Terrain", regions: np.ndarray) -> Self:
+        """Return the ground of four legs on four regions of a terrain, given by index."""
+        chosen = [terrain.regions[i] for i in regions]
+        return cls(
+            np.array([r.normal for r in chosen]),
+            np.array([r.tangent for r in chosen]),
+            np.array([r.mu_foot for r in chosen]),
+            np.array([r.mu_wheel_lateral for r in chosen]),
+            np.array([r.rolling_resistance for r in chosen]),
+        )
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What the robot should do now, in the world frame.
+
+    Attributes:
+        com, com_velocity, com_acceleration: ``(3,)`` of the centre of mass.
+        R_wb: ``(3, 3)`` orientation of the trunk; it is to rest.
+        ends, end_velocity, end_acceleration: ``(4, 3)`` of the legs' ends (centres of foot and wheel). For a
+            swinging leg the path through the air; of a wheel on the ground only its place relative to ``com``
+            is used.
+        stance: ``(4,)`` bool, which legs carry load.
+        wheels: ``(4,)`` bool, which legs stand, or would, on their wheel.
+        forces: ``(4, 3)`` forces towards which λ is regularised.
+    """
+
+    com: np.ndarray
+    com_velocity: np.ndarray
+    com_acceleration: np.ndarray
+    R_wb: np.ndarray
+    ends: np.ndarray
+    end_velocity: np.ndarray
+    end_acceleration: np.ndarray
+    stance: np.ndarray
+    wheels: np.ndarray
+    forces: np.ndarray

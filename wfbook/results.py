@@ -1,0 +1,80 @@
+"""Result folders that appear whole or not at all."""
+
+import os
+import shutil
+import tempfile
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+
+class ResultFolder:
+    """A folder that is filled out of sight and put in place at the end.
+
+    Used as a context: ``path`` is a hidden folder beside the target. ``publish`` moves what it holds into
+    the target. Leaving the context without ``publish`` leaves nothing behind, not even parent folders.
+
+    Attributes:
+        target: where the results will be.
+        path: where to write them meanwhile; on the same file system, so that moving is one step a file.
+    """
+
+    def __init__(self, target: str | os.PathLike, names: tuple[str, ...]) -> None:
+        """Remember the target; ``names`` are all files that a folder of this kind may hold."""
+        self.target = Path(target)
+        self.path = self.target
+        self._names = names
+        self._made: list[Path] = []
+
+    def __enter__(self) -> Self:
+        """Make the hidden folder, and so find out whether the target can be written.
+
+        Raises:
+            OSError: the target, or a folder above it, can't be written.
+        """
+        try:
+            self._make_parents()
+            if self.target.exists():
+                # Replaces nothing yet, but fails here, before the work, if files can't be put there.
+                with tempfile.TemporaryFile(dir=self.target):
+                    pass
+            self.path = Path(tempfile.mkdtemp(prefix=f".{self.target.name}-", dir=self.target.parent))
+        except BaseException:
+            self._remove_parents()
+            raise
+        return self
+
+    def publish(self) -> None:
+        """Move the files into the target and remove those that an earlier run left and this one lacks.
+
+        Raises:
+            OSError: a file can't be moved.
+        """
+        self.target.mkdir(exist_ok=True)
+        for name in self._names:
+            if (self.path / name).exists():
+                os.replace(self.path / name, self.target / name)
+            else:
+                (self.target / name).unlink(missing_ok=True)
+        self._made.clear()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Remove the hidden folder, and the parents that were made for nothing."""
+        shutil.rmtree(self.path)
+        self._remove_parents()
+
+    def _make_parents(self) -> None:
+        missing = []
+        parent = self.target.parent
+        while not parent.exists():
+            missing.append(parent)
+            parent = parent.parent
+        for folder in reversed(missing):
+            folder.mkdir()
+            self._made.append(folder)
+
+    def _remove_parents(self) -> None:
+        while self._made:
+            self._made.pop().rmdir()

@@ -1,0 +1,217 @@
+"""What a simulation leaves behind: the log of a run, its file, and its figures of merit."""
+
+import json
+import os
+import tempfile
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Self
+
+import numpy as np
+
+from wfbook.go1_dynamics import GRAVITY
+from wfbook.modes import END_EFFECTORS, LEGS
+from wfbook.terrain import Terrain
+from wfbook.tracking import Swing
+
+if TYPE_CHECKING:
+    from wfbook.planner.plan import Plan
+
+FORMAT = 1
+"""Version of the run file; a file of another version is refused."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A simulated run, logged at the controller's rate, ``N`` samples.
+
+    World frame; ``t`` is 0 when the plan begins and negative while the robot settles. Legs are in the order
+    of :data:`wfbook.modes.LEGS`.
+
+    Attributes:
+        t: ``(N,)`` time.
+        qpos: ``(N, 23)`` MuJoCo's configuration.
+        qvel: ``(N, 22)`` MuJoCo's velocity.
+        tau: ``(N, 12)`` torques that acted.
+        tau_command: ``(N, 12)`` torques that were computed, to act one delay later.
+        com: ``(N, 3)`` centre of mass.
+        com_velocity: ``(N, 3)``.
+        rpy: ``(N, 3)`` roll, pitch, yaw of the trunk.
+        p: ``(N, 4, 3)`` lowest point of each end effector.
+        contact_force: ``(N, 4, 3)`` on the robot.
+        in_contact: ``(N, 4)`` bool, whether a leg touches the ground.
+        end_effector: ``(N, 4)`` int8, 0 foot and 1 wheel.
+        stance: ``(N, 4)`` bool, whether a leg was commanded to carry load.
+        com_ref: ``(N, 3)`` planned centre of mass.
+        com_velocity_ref: ``(N, 3)``.
+        p_ref: ``(N, 4, 3)`` where the lowest points were to be.
+        tick_ms: ``(N,)`` computing time of each tick, in milliseconds.
+        metrics: figures of merit, see :func:`metrics_of`.
+        meta: how it was run.
+        terrain: on what.
+        joint_names: of ``qpos[:, 7:]``.
+    """
+
+    LOGGED: ClassVar[tuple[str, ...]] = (
+        *("t", "qpos", "qvel", "tau", "tau_command", "com", "com_velocity", "rpy", "p", "contact_force"),
+        *("in_contact", "end_effector", "stance", "com_ref", "com_velocity_ref", "p_ref", "tick_ms"),
+    )
+
+    t: np.ndarray
+    qpos: np.ndarray
+    qvel: np.ndarray
+    tau: np.ndarray
+    tau_command: np.ndarray
+    com: np.ndarray
+    com_velocity: np.ndarray
+    rpy: np.ndarray
+    p: np.ndarray
+    contact_force: np.ndarray
+    in_contact: np.ndarray
+    end_effector: np.ndarray
+    stance: np.ndarray
+    com_ref: np.ndarray
+    com_velocity_ref: np.ndarray
+    p_ref: np.ndarray
+    tick_ms: np.ndarray
+    metrics: dict[str, Any]
+    meta: dict[str, Any]
+    terrain: Terrain
+    joint_names: list[str]
+
+    def save(self, path: str | os.PathLike) -> None:
+        """Write the run file (``numpy.savez``), whole or not at all.
+
+        Raises:
+            OSError: the file can't be written.
+        """
+        path = Path(path)
+        arrays = {name: getattr(self, name) for name in self.LOGGED}
+        texts = {
+            "metrics": self.metrics,
+            "meta": self.meta | {"format": FORMAT},
+            "joint_names": self.joint_names,
+        }
+        arrays |= {name: np.array(json.dumps(value)) for name, value in texts.items()}
+        arrays["terrain"] = np.array(json.dumps(self.terrain.to_dict()))
+        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".npz", delete=False) as file:
+            try:
+                np.savez(file, **arrays)
+                file.close()
+                os.chmod(file.name, 0o644)
+                os.replace(file.name, path)
+            except BaseException:
+                os.unlink(file.name)
+                raise
+
+    @classmethod
+    def load(cls, path: str | os.PathLike) -> Self:
+        """Read a run file.
+
+        Raises:
+            ValueError: the file is no run, is truncated, or is of another version; the message names it.
+            OSError: the file can't be read.
+        """
+        try:
+            with np.load(path, allow_pickle=False) as file:
+                data = {name: file[name] for name in file.files}
+            texts = {
+                name: json.loads(str(data[name])) for name in ("metrics", "meta", "joint_names", "terrain")
+            }
+            arrays = {name: data[name] for name in cls.LOGGED}
+        except KeyError as error:
+            raise ValueError(f"{path}: not a run file: field {error} is missing") from error
+        except (zipfile.BadZipFile, EOFError, ValueError) as error:
+            raise ValueError(f"{path}: not a run file, or truncated ({error})") from error
+        if (version := texts["meta"].pop("format", None)) != FORMAT:
+            raise ValueError(f"{path}: meta: run format {version!r}, this program reads {FORMAT}")
+        texts["terrain"] = Terrain.from_dict(texts["terrain"], source=f"{path}: terrain")
+        return cls(**arrays, **texts)
+
+
+def metrics_of(
+    log: dict[str, np.ndarray],
+    plan: "Plan",
+    flights: list[list[Swing]],
+    mass: float,
+    work: np.ndarray,
+    slip: float,
+    fall_time: float | None,
+    qp_failures: int,
+    meta: dict[str, Any],
+) -> dict[str, Any]:
+    """Return the figures of merit of a run, all of them JSON values.
+
+    Cost of transport is work over ``m g d`` from rest to rest, once with all work counted as cost
+    (``cot_abs``) and once with only the work the motors put in (``cot_positive``). ``base_rms_m`` and
+    ``base_rms_rad`` are root mean squares of the error's length from the plan's start on. ``slip_max_m`` is
+    how far a standing foot, or a wheel sideways, slid. ``lift_off_m`` is the largest clearance of each swing.
+
+    Args:
+        log: arrays of :class:`Run`.
+        plan: that was executed.
+        flights: the swings of each leg.
+        mass: of the robot.
+        work: ``(2,)`` absolute and positive work of the motors.
+        slip: the largest slip of a standing leg.
+        fall_time: when the robot fell, since the plan's start, or None.
+        qp_failures: programs without a solution.
+        meta: of the run.
+    """
+    t, going = log["t"], log["t"] >= 0.0
+    fell = fall_time is not None
+    duration = float(plan.t[-1] - plan.t[0])
+    error = (log["com"] - log["com_ref"])[going]
+    angles = log["rpy"][going]
+    settled = log["com"][np.searchsorted(t, 0.0)] if going.any() else log["com"][-1]
+    distance = float(np.linalg.norm((log["com"][-1] - settled)[:2]))
+    weight_distance = mass * -GRAVITY[2] * max(distance, 1e-9)
+    rms = float(np.sqrt(np.mean(np.sum(error**2, axis=1)))) if going.any() else None
+    tilt = float(np.sqrt(np.mean(np.sum(angles**2, axis=1)))) if going.any() else None
+    simulated = float(t[-1] - t[0])
+    source = {name: plan.meta.get(name) for name in ("status", "objective", "bound", "gap", "nodes")}
+    return {
+        "terrain": plan.terrain.name,
+        "end_effectors": sorted({END_EFFECTORS[kind] for kind in np.unique(plan.end_effector)}),
+        **source,
+        "solve_time_s": plan.meta.get("solve_time"),
+        "planned_distance_m": plan.distance,
+        "plan_duration_s": duration,
+        "distance_m": distance,
+        "duration_s": float(t[-1]),
+        "speed_m_s": distance / duration,
+        "final_speed_m_s": float(np.linalg.norm(log["com_velocity"][-1])),
+        "swings": sum(len(legs) for legs in flights),
+        "lift_off_m": _lift_off(log, plan.terrain, flights),
+        "cot_abs": float(work[0] / weight_distance) if distance > 0.01 else None,
+        "cot_positive": float(work[1] / weight_distance) if distance > 0.01 else None,
+        "base_rms_m": rms,
+        "base_rms_rad": tilt,
+        "base_rms_xyz_m": np.sqrt(np.mean(error**2, axis=0)).tolist() if going.any() else None,
+        "base_rms_rpy_rad": np.sqrt(np.mean(angles**2, axis=0)).tolist() if going.any() else None,
+        "estimate_drift_percent": None,
+        "estimate_velocity_rms_m_s": None,
+        "slip_max_m": slip,
+        "tick_ms_median": float(np.median(log["tick_ms"])),
+        "tick_ms_p99": float(np.percentile(log["tick_ms"], 99)),
+        "real_time_factor": simulated / meta["wall_time"],
+        "qp_failures": qp_failures,
+        "upright": not fell,
+        "fell": fell,
+        "fall_time_s": fall_time,
+    }
+
+
+def _lift_off(
+    log: dict[str, np.ndarray], terrain: Terrain, flights: list[list[Swing]]
+) -> dict[str, list[float]]:
+    """Return the largest clearance of each leg's each swing."""
+    clearances: dict[str, list[float]] = {}
+    for index, leg in enumerate(LEGS):
+        clearances[leg] = []
+        for flight in flights[index]:
+            during = (log["t"] >= flight.start) & (log["t"] < flight.end)
+            heights = [p[2] - (terrain.height(p[0], p[1]) or 0.0) for p in log["p"][during, index]]
+            clearances[leg].append(float(max(heights, default=0.0)))
+    return clearances

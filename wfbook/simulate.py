@@ -1,0 +1,237 @@
+"""Chapter 8: execute a plan in MuJoCo through the whole-body controller.
+
+Physics runs at 1 kHz, the controller at 500 Hz, and a torque acts one delay after it was computed
+(paper A: 9 ms).
+"""
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from wfbook.go1 import Go1
+from wfbook.go1_dynamics import MOTORS, Go1Dynamics
+from wfbook.modes import END_EFFECTORS
+from wfbook.reference import Gains, Ground, Reference
+from wfbook.runs import Run, metrics_of
+from wfbook.tracking import Tracker
+from wfbook.wbc import WholeBodyController, contacts, weight_share
+
+if TYPE_CHECKING:
+    from wfbook.planner.plan import Plan
+
+__all__ = ["Run", "run"]
+
+SETTLE = 0.5
+"""Time in which the robot comes to rest in the plan's first posture."""
+
+_CONTROL_STEPS = 2
+_FEELS = 3.0
+_FALLEN_TILT = np.cos(np.radians(60.0))
+
+
+def run(
+    plan: "Plan",
+    delay: float = 0.009,
+    state: str = "true",
+    hold: float = 1.0,
+    seed: int = 0,
+    progress: Callable[[float, float], None] | None = None,
+    push: tuple[np.ndarray, float, float] | None = None,
+    joint_friction: float = 0.0,
+    trunk_mass_scale: float = 1.0,
+    gains: Gains | None = None,
+) -> Run:
+    """Execute a plan: settle in its first posture, follow it, stand still at its end.
+
+    A fall ends the run; it is reported in the metrics, not raised.
+
+    Args:
+        plan: what to do; a polished one if it is to succeed.
+        delay: after which a torque acts, a whole number of milliseconds.
+        state: what the controller knows: ``"true"``, MuJoCo's state.
+        hold: time to stand at the end.
+        seed: of the small random error in the start posture (2 mrad in each joint).
+        progress: called with simulated and total time, ten times a simulated second.
+        push: force ``(3,)`` on the trunk in the world, its start after the plan's, and its duration.
+        joint_friction: dry friction in the simulated joints, N m, which the controller does not know.
+        trunk_mass_scale: of the simulated trunk, likewise.
+        gains: of the controller.
+
+    Raises:
+        ValueError: an argument is out of range, or the plan's first posture is out of reach.
+    """
+    if state == "estimated":
+        raise ValueError(
+            "state: 'estimated' needs the state estimator, which this version does not have; use 'true'"
+        )
+    if state != "true":
+        raise ValueError(f"state: {state!r} is neither 'true' nor 'estimated'")
+    for name, value in (("delay", delay), ("hold", hold)):
+        if not 0.0 <= value < 100.0:
+            raise ValueError(f"{name}: {value!r} is not between 0 and 100 s")
+    return _Execution(plan, delay, seed, push, joint_friction, trunk_mass_scale, gains).run(hold, progress)
+
+
+class _Execution:
+    """One run in progress: the simulated robot, its controller and the log."""
+
+    def __init__(
+        self,
+        plan: "Plan",
+        delay: float,
+        seed: int,
+        push: tuple[np.ndarray, float, float] | None,
+        joint_friction: float,
+        trunk_mass_scale: float,
+        gains: Gains | None,
+    ) -> None:
+        self.plan, self.delay, self.push = plan, delay, push
+        self.robot = Go1(plan.terrain, joint_friction, trunk_mass_scale)
+        self.dynamics = Go1Dynamics()
+        self.controller = WholeBodyController(self.dynamics, gains)
+        self.tracker = Tracker(plan, delay)
+        self.step_time = float(self.robot.model.opt.timestep)
+        kinds = np.array([END_EFFECTORS.index(name) for name in plan.meta["start_end_effectors"]])
+        qpos = self.dynamics.posture(plan.x[0], np.zeros(3), self.tracker.start_ends())
+        qpos[1 + MOTORS] += 0.002 * np.random.default_rng(seed).standard_normal(12)
+        self.robot.reset(qpos, kinds)
+        self.log: dict[str, list] = {name: [] for name in Run.LOGGED}
+        self.work = np.zeros(2)
+        self.asked = np.zeros((4, 3))
+        self.slip, self.slip_max, self.standing = np.zeros((4, 3)), 0.0, np.zeros(4, int)
+        self.meta = {
+            "delay": delay,
+            "seed": seed,
+            "settle": SETTLE,
+            "joint_friction": joint_friction,
+            "trunk_mass_scale": trunk_mass_scale,
+            "plan": {
+                key: plan.meta.get(key)
+                for key in ("stage", "objective", "bound", "gap", "status", "solve_time", "nodes")
+            },
+        }
+
+    def run(self, hold: float, progress: Callable[[float, float], None] | None) -> Run:
+        """Simulate to the end or to the fall, and return the log."""
+        plan_duration = float(self.plan.t[-1] - self.plan.t[0])
+        steps = round((SETTLE + plan_duration + hold) / self.step_time)
+        waiting: deque[np.ndarray] = deque()
+        fall_time, began = None, time.perf_counter()
+        for step in range(steps + 1):
+            t = step * self.step_time - SETTLE
+            if step % _CONTROL_STEPS == 0:
+                command = self._tick(t)
+                if not waiting:
+                    waiting.extend([command] * round(self.delay / self.step_time))
+            waiting.append(command)
+            torque = waiting.popleft()
+            if step % _CONTROL_STEPS == 0:
+                self.log["tau"].append(torque)
+            self._push(t)
+            self._physics(torque, t)
+            if progress is not None and step % 100 == 0:
+                progress(t + SETTLE, steps * self.step_time)
+            if self._fallen():
+                fall_time = t
+                break
+        self.meta["wall_time"] = time.perf_counter() - began
+        data = {name: np.array(values) for name, values in self.log.items()}
+        metrics = metrics_of(
+            data,
+            self.plan,
+            self.tracker.flights,
+            self.dynamics.mass,
+            self.work,
+            self.slip_max,
+            fall_time,
+            self.controller.failures,
+            self.meta,
+        )
+        return Run(
+            **data,
+            metrics=metrics,
+            meta=self.meta,
+            terrain=self.plan.terrain,
+            joint_names=self.robot.joint_names,
+        )
+
+    def _tick(self, t: float) -> np.ndarray:
+        """Run the controller once, log, and return the torques it commands."""
+        robot, dynamics, tracker = self.robot, self.dynamics, self.tracker
+        forces = robot.contact_forces()
+        began = time.perf_counter()
+        dynamics.update(robot.data.qpos, robot.data.qvel)
+        touching = np.linalg.norm(forces, axis=1) > _FEELS
+        ref, ground = tracker.update(t, dynamics, touching, self.asked)
+        for leg, kind in tracker.switches(t, dynamics.centres, robot.end_effectors):
+            robot.set_end_effector(leg, kind)
+        present = robot.end_effectors.astype(bool)
+        share = weight_share(dynamics, ref.com_acceleration, ref.stance)
+        ref = replace(ref, wheels=present, forces=share)
+        command = self.controller.tick(ref, ground)
+        self.asked = command.forces
+        elapsed = time.perf_counter() - began
+        self._slip(ground, ref, forces)
+        sample = {
+            "t": t,
+            "qpos": robot.data.qpos.copy(),
+            "qvel": robot.data.qvel.copy(),
+            "tau_command": command.torques,
+            "com": dynamics.com,
+            "com_velocity": dynamics.com_velocity,
+            "rpy": roll_pitch_yaw(dynamics.R_wb),
+            "p": dynamics.centres + dynamics.contact_offsets(ground.normals, present),
+            "contact_force": forces,
+            "in_contact": np.linalg.norm(forces, axis=1) > 1.0,
+            "end_effector": robot.end_effectors,
+            "stance": ref.stance,
+            "com_ref": ref.com,
+            "com_velocity_ref": ref.com_velocity,
+            "p_ref": ref.ends + dynamics.contact_offsets(ground.normals, present),
+            "tick_ms": 1e3 * elapsed,
+        }
+        for name, value in sample.items():
+            self.log[name].append(value)
+        return command.torques
+
+    def _slip(self, ground: Ground, ref: Reference, forces: np.ndarray) -> None:
+        """Add up how far standing feet slide, and wheels sideways; a foot's rolling is no slip."""
+        standing = ref.stance & (forces[:, 2] > _FEELS)
+        self.standing = np.where(standing, self.standing + 1, 0)
+        contact = contacts(self.dynamics, ground, ref.wheels)
+        velocity = contact.velocity * np.where(ref.wheels[:, None], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0])
+        self.slip = np.where(
+            self.standing[:, None] > 10, self.slip + _CONTROL_STEPS * self.step_time * velocity, 0.0
+        )
+        self.slip_max = max(self.slip_max, float(np.linalg.norm(self.slip, axis=1).max()))
+
+    def _push(self, t: float) -> None:
+        """Apply the push while it lasts."""
+        if self.push is not None:
+            force, start, duration = self.push
+            self.robot.push(np.asarray(force, float) * (start <= t < start + duration))
+
+    def _physics(self, torque: np.ndarray, t: float) -> None:
+        """Simulate a millisecond and account for the motors' work once the plan has begun."""
+        before = self.robot.data.qvel[MOTORS].copy()
+        self.robot.step(torque)
+        if t >= 0.0:
+            power = torque * 0.5 * (before + self.robot.data.qvel[MOTORS])
+            self.work += self.step_time * np.array([np.abs(power).sum(), np.maximum(power, 0.0).sum()])
+
+    def _fallen(self) -> bool:
+        """Whether the trunk is tipped over or anything but the legs' ends lies on the ground."""
+        _w, x, y, _z = self.robot.data.qpos[3:7]
+        upright = 1.0 - 2.0 * (x * x + y * y) > _FALLEN_TILT
+        return not upright or self.robot.touches_with_hull()
+
+
+def roll_pitch_yaw(R: np.ndarray) -> np.ndarray:
+    """Return roll, pitch and yaw of a rotation matrix, ``(3,)``."""
+    return np.array(
+        [np.arctan2(R[2, 1], R[2, 2]), -np.arcsin(np.clip(R[2, 0], -1, 1)), np.arctan2(R[1, 0], R[0, 0])]
+    )

@@ -1,0 +1,343 @@
+"""Chapter 8: what a plan asks of the robot at any instant.
+
+A plan is a list of knots 0.1 s apart; a controller runs every 2 ms and its torques arrive one delay
+later. In between stands :class:`Tracker`. It interpolates the plan, swings the legs, and takes from the
+robot's own sensing what a plan can't know: when a leg really touches the ground.
+
+- The centre of mass is interpolated as the plan was integrated, a parabola between knots. (Holding the
+  last knot is seven times worse.)
+- A leg is commanded to lift, and forces are redistributed, one delay before the plan says so: then it
+  happens on time.
+- A swing aims to land after 88 % of its slot, so that it has landed when the plan loads it.
+- A leg that touches early stands from then on; a leg that is late keeps going down.
+- A robot on two legs tips across the line between them. The swinging legs land as far aside as it has
+  tipped, and hold it.
+- The end effector is switched in the air, past the apex, when the larger wheel has room.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from wfbook.go1 import RADII
+from wfbook.go1_dynamics import GRAVITY, Go1Dynamics
+from wfbook.modes import END_EFFECTORS, LEGS
+from wfbook.reference import Ground, Reference
+from wfbook.swing import quintic_basis, swing_position
+
+if TYPE_CHECKING:
+    from wfbook.planner.plan import Plan
+    from wfbook.terrain import Region
+
+LANDING_PHASE = 0.88
+"""Fraction of its slot after which a swing lands."""
+
+_SAMPLE = 0.001
+_SEARCH_SPEED = 0.15
+_SEARCH_DEPTH = 0.06
+_LOST_AFTER = 0.02
+_LOADED = 15.0
+_PRESS = 0.004
+_PATIENCE = 0.05
+_COMMITTED = 0.9
+_FARTHEST_ASIDE = 0.04
+_SWITCH_ROOM = 0.004
+
+
+@dataclass(frozen=True)
+class Swing:
+    """One flight of one leg; consecutive swing slots are one flight.
+
+    Attributes:
+        start, end: times of the plan's slots.
+        target: ``(3,)`` contact point to land on.
+        kind: end effector to land with, 0 foot, 1 wheel.
+        region: to land on.
+        offset: ``(3,)`` of the landed contact point from the planned CoM, both at ``end``.
+    """
+
+    start: float
+    end: float
+    target: np.ndarray
+    kind: int
+    region: int
+    offset: np.ndarray
+
+    @property
+    def duration(self) -> float:
+        """Time from lift-off to the planned landing, which is before ``end``."""
+        return LANDING_PHASE * (self.end - self.start)
+
+
+def swings_of(plan: "Plan") -> list[list[Swing]]:
+    """Return the flights of each leg, in order."""
+    rho = plan.knots // plan.slots
+    kinds, regions = plan.end_effector, plan.D.sum(axis=3).argmax(axis=2)
+    flights: list[list[Swing]] = []
+    for leg in range(4):
+        padded = np.diff(np.concatenate([[0], plan.S[leg], [0]]))
+        flights.append([])
+        for first, after in zip(np.flatnonzero(padded == 1), np.flatnonzero(padded == -1), strict=True):
+            target = plan.p[after * rho, leg]
+            flights[leg].append(
+                Swing(
+                    float(plan.t[first * rho] - plan.t[0]),
+                    float(plan.t[after * rho] - plan.t[0]),
+                    target,
+                    int(kinds[leg, after - 1]),
+                    int(regions[leg, after - 1]),
+                    target - plan.x[after * rho],
+                )
+            )
+    return flights
+
+
+def interpolate(plan: "Plan", t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the planned CoM, its velocity and acceleration at a time since the plan's start, each ``(3,)``.
+
+    Before and after the plan, its first and last position at rest.
+    """
+    dt = plan.dt
+    if t < 0.0:
+        return plan.x[0], np.zeros(3), np.zeros(3)
+    k = int(t / dt + 1e-9)
+    if k >= plan.knots:
+        return plan.x[-1], np.zeros(3), np.zeros(3)
+    s = t - k * dt
+    return plan.x[k] + s * plan.v[k] + 0.5 * s * s * plan.a[k], plan.v[k] + s * plan.a[k], plan.a[k]
+
+
+class Tracker:
+    """Turns a plan and what the robot feels into references.
+
+    Args:
+        plan: to follow. Its time 0 is the tracker's.
+        delay: after which torques act.
+
+    Attributes:
+        stance: ``(4,)`` bool, which legs are commanded to carry load now.
+        lifted: how many flights each leg has begun, ``(4,)``.
+    """
+
+    def __init__(self, plan: "Plan", delay: float) -> None:
+        self.plan, self.delay = plan, delay
+        self.flights = swings_of(plan)
+        self.stance = np.ones(4, bool)
+        self.lifted = np.zeros(4, int)
+        self._from = np.zeros((4, 3))
+        self._paths: list[np.ndarray] = [np.zeros((3, 2, 4))] * 4
+        self._searching_since = np.full(4, np.nan)
+        self._last_touch = np.zeros(4)
+        self._shift = np.zeros((4, 3))
+        self._start = np.zeros(4)
+        kinds = [END_EFFECTORS.index(name) for name in plan.meta["start_end_effectors"]]
+        self._kinds = np.array(kinds)
+        planned = plan.D.sum(axis=3).argmax(axis=2)[:, 0]
+        first = [self._region_of(plan.p[0, leg], int(planned[leg])) for leg in range(4)]
+        self._standing_on = np.array(first)
+        self._offsets = plan.p[0] - plan.x[0]
+        self._footholds = plan.p[0].copy()
+
+    def start_ends(self) -> np.ndarray:
+        """Return the centres of the legs' ends in the plan's first posture, ``(4, 3)``."""
+        normals = np.array([self.plan.terrain.regions[r].normal for r in self._standing_on])
+        return self.plan.p[0] + RADII[self._kinds][:, None] * normals
+
+    def update(
+        self, t: float, robot: Go1Dynamics, touching: np.ndarray, forces: np.ndarray
+    ) -> tuple[Reference, Ground]:
+        """Advance to a time and return what to do.
+
+        Args:
+            t: time since the plan's start; negative while the robot settles.
+            robot: dynamics at the present state.
+            touching: ``(4,)`` bool, which legs feel the ground.
+            forces: ``(4, 3)`` that the controller last asked of the ground.
+
+        Returns:
+            Reference (its ``wheels`` say what each leg should stand on, its ``forces`` are zero) and ground.
+        """
+        ends = robot.centres
+        self._last_touch[touching | (forces[:, 2] < _LOADED)] = t  # who presses on nothing feels nothing
+        com, velocity, _ = interpolate(self.plan, t)
+        ahead = interpolate(self.plan, t + self.delay)[2]
+        for leg in range(4):
+            self._advance(leg, t, bool(touching[leg]), ends[leg], robot.centre_velocity[leg])
+        rolling = self._kinds[:, None] == 1
+        p = np.where(rolling, self._offsets + com, self._footholds)
+        v, a = np.where(rolling, velocity, 0.0), np.zeros((4, 3))
+        self._step_aside(t, robot, com, velocity)
+        terrain = self.plan.terrain
+        regions = self._ground_regions(ends)
+        ground = Ground.under(terrain, regions)
+        p += RADII[self._kinds][:, None] * ground.normals
+        for leg in np.flatnonzero(~self.stance):
+            p[leg], v[leg], a[leg] = self._in_the_air(leg, t, ground.normals[leg])
+        wheels = self._kinds.astype(bool)
+        ref = Reference(
+            com, velocity, ahead, np.eye(3), p, v, a, self.stance.copy(), wheels, np.zeros((4, 3))
+        )
+        return ref, ground
+
+    def switches(self, t: float, ends: np.ndarray, present: np.ndarray) -> list[tuple[str, str]]:
+        """Return which legs should change their end effector now, as (leg, kind).
+
+        Args:
+            t: time since the plan's start.
+            ends: ``(4, 3)`` centres of the legs' ends.
+            present: ``(4,)`` end effectors now.
+        """
+        wanted = []
+        for leg in np.flatnonzero(~self.stance & (self._kinds != present)):
+            flight = self.flights[leg][self.lifted[leg] - 1]
+            region = self.plan.terrain.regions[self._region_of(ends[leg], flight.region)]
+            room = (ends[leg, 2] - region.height(*ends[leg, :2])) * region.normal[2]
+            if t >= flight.start + 0.4 * flight.duration and room > RADII[self._kinds[leg]] + _SWITCH_ROOM:
+                wanted.append((LEGS[leg], END_EFFECTORS[self._kinds[leg]]))
+        return wanted
+
+    def _advance(self, leg: int, t: float, touching: bool, end: np.ndarray, velocity: np.ndarray) -> None:
+        """Move one leg's state on: lift-off, touch-down, loss of contact."""
+        flights, count = self.flights[leg], self.lifted[leg]
+        if count < len(flights) and t + self.delay >= flights[count].start - 1e-9 and self._may_lift(leg, t):
+            flight = flights[count]
+            self.lifted[leg] += 1
+            self.stance[leg] = False
+            self._start[leg] = max(t, flight.start)
+            self._paths[leg] = self._flight_path(flight, leg, end, velocity)
+            self._kinds[leg], self._standing_on[leg] = flight.kind, flight.region
+            self._searching_since[leg] = np.nan
+            self._shift[leg] = 0.0
+            return
+        if self.stance[leg]:
+            if t > 0 and t - self._last_touch[leg] > self.delay + _LOST_AFTER:
+                self.stance[leg] = False
+                self._from[leg] = end
+                self._searching_since[leg] = t
+            return
+        searching = np.isfinite(self._searching_since[leg])
+        flight = flights[count - 1] if count else None
+        falling = searching or t >= flight.start + 0.5 * flight.duration
+        if falling and touching:
+            self.stance[leg] = True
+            self._searching_since[leg] = np.nan
+            if flight is not None:
+                self._offsets[leg], self._footholds[leg] = flight.offset, flight.target
+
+    def _may_lift(self, leg: int, t: float) -> bool:
+        """Whether a leg due to lift leaves two others standing; if not, it waits for late ones a little."""
+        flight = self.flights[leg][self.lifted[leg]]
+        staying = [
+            other
+            for other in np.flatnonzero(self.stance)
+            if not any(f.start <= flight.start < f.end for f in self.flights[other])
+        ]
+        return len(staying) >= 2 or t > flight.start + _PATIENCE
+
+    def _flight_path(self, flight: Swing, leg: int, start: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """Return the path of a leg's end from lift-off to landing (Paper A, eqs 2–6).
+
+        Args:
+            flight: the swing.
+            leg: which still has the end effector it lifts.
+            start: ``(3,)`` where the leg's end is.
+            velocity: ``(3,)`` its velocity.
+
+        Returns:
+            ``(3, n, 4)``: position, velocity and acceleration, and in the fourth column how much of a shift
+            of the landing point they take on; one sample a millisecond and one beyond the end.
+        """
+        duration, target, landing = self._duration(leg, flight), flight.target, np.zeros(3)
+        if flight.kind:  # a wheel lands moving with the robot, and rolls on until the slot ends
+            com, com_velocity, _ = interpolate(self.plan, flight.start + flight.duration)
+            landing[0] = com_velocity[0]
+            target = target - np.array([interpolate(self.plan, flight.end)[0][0] - com[0], 0.0, 0.0])
+        target = target + (RADII[flight.kind] - _PRESS) * self.plan.terrain.regions[flight.region].normal
+        # the larger of the two end effectors clears the ground by the swing height
+        apex = self.plan.meta["swing_height"] + 0.5 * abs(RADII[flight.kind] - RADII[self._kinds[leg]])
+        count = round(duration / _SAMPLE) + 2
+        phase = np.minimum(np.arange(count) * _SAMPLE / duration, 1.0)
+        path = np.empty((3, count, 4))
+        for d in range(3):
+            path[d, :, :3] = swing_position(phase, duration, start, target, apex, velocity, landing, d)
+            path[d, :, 3] = quintic_basis(phase, d)[:, 2] / duration**d
+        return path
+
+    def _duration(self, leg: int, flight: Swing) -> float:
+        """Return the time from a leg's actual lift-off to its planned landing."""
+        return flight.start + flight.duration - self._start[leg]
+
+    def _in_the_air(
+        self, leg: int, t: float, normal: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return where a leg's end should be in the air, its velocity and acceleration, each ``(3,)``."""
+        if np.isfinite(since := self._searching_since[leg]):
+            depth = min(_SEARCH_SPEED * (t - since), _SEARCH_DEPTH)
+            return self._from[leg] - depth * normal, -_SEARCH_SPEED * normal, np.zeros(3)
+        flight, path, shift = self.flights[leg][self.lifted[leg] - 1], self._paths[leg], self._shift[leg]
+        late = t - flight.start - flight.duration
+        if late >= 0.0:
+            depth = min(_SEARCH_SPEED * late, _SEARCH_DEPTH)
+            landing = path[1, -1, :3]
+            position = path[0, -1, :3] + shift + late * landing - depth * normal
+            return position, landing - _SEARCH_SPEED * normal, np.zeros(3)
+        elapsed = t - self._start[leg]
+        now = np.vstack([_sampled(path[:2], elapsed), _sampled(path[2:], elapsed + self.delay)])
+        return tuple(now[:, :3] + now[:, 3:] * shift)
+
+    def _step_aside(self, t: float, robot: Go1Dynamics, com: np.ndarray, velocity: np.ndarray) -> None:
+        """Choose how far beside their planned footholds the swinging legs land.
+
+        On two legs the robot is an inverted pendulum about the line between them: no force moves it across,
+        and what the plan did not know of (the swing of the legs themselves, above all) grows as ``e^(ω t)``
+        until other legs take over. If these land as far aside as the pendulum will have gone, they hold it.
+        """
+        omega = np.sqrt(-GRAVITY[2] / self.plan.meta["com_height"])
+        standing = np.flatnonzero(self.stance)
+        across = np.zeros(2)
+        if len(standing) == 2:
+            line = robot.centres[standing[1], :2] - robot.centres[standing[0], :2]
+            across = np.array([-line[1], line[0]]) / np.linalg.norm(line)
+        error = (robot.com - com + (robot.com_velocity - velocity) / omega)[:2]
+        for leg in np.flatnonzero(~self.stance):
+            flight = self.flights[leg][self.lifted[leg] - 1] if self.lifted[leg] else None
+            if flight is None or t > flight.start + _COMMITTED * flight.duration:
+                continue
+            growth = np.exp(omega * (flight.start + flight.duration - t))
+            shift = across * (across @ error) * growth
+            shift *= min(1.0, _FARTHEST_ASIDE / max(np.linalg.norm(shift), 1e-9))
+            region = self.plan.terrain.regions[flight.region]
+            shift *= _room(region, flight.target, shift)
+            rise = -(region.normal[:2] @ shift) / region.normal[2]
+            self._shift[leg] = [*shift, rise]
+
+    def _region_of(self, point: np.ndarray, default: int) -> int:
+        """Return the region below a point, or the default where there is none."""
+        terrain = self.plan.terrain
+        if len(terrain.regions) == 1:
+            return 0
+        index = terrain.region_at(float(point[0]), float(point[1]))
+        return default if index is None else index
+
+    def _ground_regions(self, ends: np.ndarray) -> np.ndarray:
+        """Return what each leg stands on, ``(4,)``: wheels roll from region to region."""
+        for leg in np.flatnonzero(self.stance & (self._kinds == 1)):
+            self._standing_on[leg] = self._region_of(ends[leg], int(self._standing_on[leg]))
+        return self._standing_on
+
+
+def _sampled(path: np.ndarray, elapsed: float) -> np.ndarray:
+    """Return the samples ``(m, 3)`` of ``(m, n, 3)`` at a time since lift-off, interpolated linearly."""
+    place = min(max(elapsed / _SAMPLE, 0.0), path.shape[1] - 1.001)
+    index = int(place)
+    return path[:, index] + (place - index) * (path[:, index + 1] - path[:, index])
+
+
+def _room(region: "Region", point: np.ndarray, shift: np.ndarray) -> float:
+    """Return how much of a shift ``(2,)`` a point can make inside its region, 0 to 1 (Paper A, eq. 22)."""
+    A, b = region.halfspaces
+    outward = A @ shift
+    room = np.maximum(b - A @ point[:2], 0.0)
+    leaving = outward > room
+    return float(np.min(room[leaving] / outward[leaving], initial=1.0))

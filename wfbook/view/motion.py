@@ -1,0 +1,106 @@
+"""What a replay shows of a run or of a plan: everything sampled at the frames of the animation."""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from wfbook.go1 import RADII, WHEEL_RADIUS
+from wfbook.modes import LEGS
+from wfbook.terrain import Terrain
+from wfbook.view.spans import SWINGING, plan_modes
+from wfbook.view.tracks import FPS
+
+if TYPE_CHECKING:
+    from wfbook.planner import Plan
+    from wfbook.simulate import Run
+
+
+@dataclass(frozen=True)
+class Motion:
+    """N frames of a robot that moves.
+
+    Attributes:
+        start: time of the first frame.
+        qpos: (N, 23) MuJoCo configurations.
+        end_effector: (N, 4), 0 foot or 1 wheel.
+        modes: (N, 4), 0 stands on its foot, 1 on its wheel, 2 swings.
+        contact: (N, 4, 3) lowest point of each leg.
+        force: (N, 4, 3) contact force on the robot, world frame.
+        planned_com: (N, 3).
+        measured_com: (N, 3), or None for a plan that nobody has executed.
+        terrain: the ground.
+    """
+
+    start: float
+    qpos: np.ndarray
+    end_effector: np.ndarray
+    modes: np.ndarray
+    contact: np.ndarray
+    force: np.ndarray
+    planned_com: np.ndarray
+    measured_com: np.ndarray | None
+    terrain: Terrain
+
+
+def motion_of_run(run: "Run") -> Motion:
+    """Sample a run: poses at each frame, forces as their mean over the frame.
+
+    A single sample of a contact force at 500 Hz is mostly the contact's own noise.
+    """
+    times = np.arange(run.t[0], run.t[-1] + 1e-9, 1.0 / FPS)
+    at = np.clip(np.searchsorted(run.t, times - 1e-9), 0, len(run.t) - 1)
+    edges = np.clip(np.searchsorted(run.t, times[:, None] + np.array([-0.5, 0.5]) / FPS), 0, len(run.t))
+    total = np.concatenate([np.zeros((1, len(LEGS), 3)), np.cumsum(run.contact_force, axis=0)])
+    first, last = edges.T
+    force = (total[last] - total[first]) / (last - first)[:, None, None]
+    return Motion(
+        start=float(times[0]),
+        qpos=run.qpos[at],
+        end_effector=run.end_effector[at],
+        modes=np.where(run.stance, run.end_effector, SWINGING)[at],
+        contact=run.p[at],
+        force=force,
+        planned_com=run.com_ref[at],
+        measured_com=run.com[at],
+        terrain=run.terrain,
+    )
+
+
+def motion_of_plan(plan: "Plan") -> Motion:
+    """Pose the robot as a plan wants it, whether or not any controller could do it.
+
+    Between knots the motion is interpolated so that a foot which stands stays where it is.
+
+    Raises:
+        ValueError: the plan puts a leg where the Go1's can't reach.
+    """
+    from wfbook.go1_dynamics import Go1Dynamics
+
+    times = np.arange(plan.t[0], plan.t[-1] + 1e-9, 1.0 / FPS)
+    com, theta, contact = (
+        PchipInterpolator(plan.t, values)(times) for values in (plan.x, plan.theta, plan.p)
+    )
+    slot = np.clip(((times - plan.t[0] + 1e-9) / plan.slot_duration).astype(int), 0, plan.slots - 1)
+    knot = np.clip(np.searchsorted(plan.t, times + 1e-9, side="right") - 1, 0, plan.knots - 1)
+    wheel = plan.end_effector.T[slot]
+    robot = Go1Dynamics()
+    qpos = []
+    for frame in range(len(times)):
+        centres = contact[frame] + np.outer(RADII[wheel[frame]], [0.0, 0.0, 1.0])
+        qpos.append(robot.posture(com[frame], theta[frame], centres))
+    qpos = np.array(qpos)
+    rolled = np.vstack([np.zeros(len(LEGS)), np.diff(contact[:, :, 0], axis=0)]) * (wheel == 1)
+    qpos[:, 10::4] = np.cumsum(rolled, axis=0) / WHEEL_RADIUS
+    return Motion(
+        start=float(times[0]),
+        qpos=qpos,
+        end_effector=wheel,
+        modes=plan_modes(plan.S, plan.end_effector).T[slot],
+        contact=contact,
+        force=(plan.lam + plan.f)[knot],
+        planned_com=com,
+        measured_com=None,
+        terrain=plan.terrain,
+    )

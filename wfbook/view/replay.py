@@ -1,0 +1,158 @@
+"""Replays in 3D that open anywhere: in a notebook, in a page of the book, or as one file offline.
+
+    replay.save(run, "replay.html")     one file; "replay.html#t=1.5" opens still at 1.5 s
+    Replay(run)                         at the end of a cell, shows itself
+
+A replay shows the robot with the end effector it uses (green foot, orange wheel), the contact forces, where
+the legs stood and rolled, and the path of the centre of mass. A plan can be replayed too, before any
+controller has seen it: then the robot is posed as the plan wants it.
+"""
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+from meshcat import Visualizer
+
+from wfbook.go1 import ASSETS
+from wfbook.modes import LEGS
+from wfbook.view import scene
+from wfbook.view.meshcat_static import Recorder, frame, page
+from wfbook.view.motion import Motion, motion_of_plan, motion_of_run
+from wfbook.view.spans import SWINGING, spans
+from wfbook.view.style import FOOT, FORCE, MEASURED, MODE_COLOURS, PLANNED, WHEEL
+from wfbook.view.tracks import Tracks
+
+if TYPE_CHECKING:
+    from wfbook.planner import Plan
+    from wfbook.simulate import Run
+
+_MARGIN = 1.5
+_ARROW_LENGTH = 0.5
+"""Length of the arrow of a force as large as the robot's weight."""
+_SMALLEST_FORCE = 1.0
+
+
+def html(motion: "Run | Plan", title: str | None = None) -> str:
+    """Return a self-contained page that replays a run or a plan.
+
+    Args:
+        motion: what to replay.
+        title: of the page; by default the terrain's name.
+    """
+    shown = motion_of_run(motion) if hasattr(motion, "qpos") else motion_of_plan(motion)
+    legend = {"foot": FOOT, "wheel": WHEEL, "contact force": FORCE, "CoM planned": PLANNED}
+    if shown.measured_com is not None:
+        legend["CoM measured"] = MEASURED
+    return page(commands(shown), title or f"replay: {shown.terrain.name}", legend, shown.start)
+
+
+def save(motion: "Run | Plan", path: str | os.PathLike, title: str | None = None) -> None:
+    """Write the page that replays a run or a plan.
+
+    Raises:
+        OSError: the file can't be written.
+    """
+    Path(path).write_text(html(motion, title), encoding="utf-8", newline="\n")
+
+
+class Replay:
+    """Shows a run or a plan in a notebook, without a server and without the kernel once it is drawn.
+
+    Args:
+        motion: what to replay.
+        height: of the frame, in pixels.
+    """
+
+    def __init__(self, motion: "Run | Plan", height: int = 420) -> None:
+        self._html = frame(html(motion), height)
+
+    def _repr_html_(self) -> str:
+        return self._html
+
+
+def commands(motion: Motion) -> list[dict]:
+    """Return Meshcat's commands that draw and animate a motion."""
+    recorder = Recorder()
+    visualizer, tracks = recorder.visualizer(), Tracks()
+    model = mujoco.MjModel.from_xml_path(str(ASSETS / "go1.xml"))
+    _stage(visualizer, tracks, motion)
+    named = scene.add_robot(visualizer, model)
+    _move_bodies(visualizer, tracks, model, motion.qpos)
+    for leg, name in enumerate(LEGS):
+        tracks.add(named[f"{name}_foot"], "visible", motion.end_effector[:, leg] == 0)
+        tracks.add(named[f"{name}_wheel"], "visible", motion.end_effector[:, leg] == 1)
+    weight = float(model.body_subtreemass[0]) * float(np.linalg.norm(model.opt.gravity))
+    _move_arrows(visualizer, tracks, motion, _ARROW_LENGTH / weight)
+    _draw_prints(visualizer, motion)
+    scene.add_line(visualizer["com/planned"], motion.planned_com, PLANNED)
+    if motion.measured_com is not None:
+        scene.add_line(visualizer["com/measured"], motion.measured_com, MEASURED)
+    tracks.play(visualizer)
+    return recorder.commands
+
+
+def _stage(visualizer: Visualizer, tracks: Tracks, motion: Motion) -> None:
+    """Set background, ground, light and a camera that travels with the planned centre of mass."""
+    path = motion.planned_com
+    visualizer["/Background"].set_property("top_color", [1.0, 1.0, 1.0])
+    visualizer["/Background"].set_property("bottom_color", [0.93, 0.95, 0.97])
+    visualizer["/Grid"].set_property("visible", False)
+    visualizer["/Axes"].set_property("visible", False)
+    low, high = path[:, :2].min(axis=0) - _MARGIN, path[:, :2].max(axis=0) + _MARGIN
+    scene.add_light(visualizer["/Lights"], reach=float(np.abs([low, high]).max()))
+    scene.add_terrain(visualizer, motion.terrain, low, high)
+    # Meshcat's camera turns about the origin of its parent node, and in its own frame y is up.
+    tracks.add(visualizer["/Cameras/default"], "position", path * [1.0, 1.0, 0.6])
+    camera = visualizer["/Cameras/default/rotated/<object>"]
+    camera.set_property("position", [0.9, 0.9, 1.9])
+    camera.set_property("zoom", 2.2)
+
+
+def _move_bodies(visualizer: Visualizer, tracks: Tracks, model: mujoco.MjModel, qpos: np.ndarray) -> None:
+    """Animate every body relative to the one that carries it."""
+    data = mujoco.MjData(model)
+    positions = np.empty((len(qpos), model.nbody, 3))
+    quaternions = np.empty((len(qpos), model.nbody, 4))
+    inverse = np.empty(4)
+    for k, q in enumerate(qpos):
+        data.qpos = q
+        mujoco.mj_kinematics(model, data)
+        for body in range(1, model.nbody):
+            parent = int(model.body_parentid[body])
+            mujoco.mju_negQuat(inverse, data.xquat[parent])
+            mujoco.mju_mulQuat(quaternions[k, body], inverse, data.xquat[body])
+            mujoco.mju_rotVecQuat(positions[k, body], data.xpos[body] - data.xpos[parent], inverse)
+    for body, node in scene.body_nodes(visualizer, model).items():
+        tracks.add(node, "position", positions[:, body])
+        tracks.add(node, "quaternion", quaternions[:, body])
+
+
+def _move_arrows(visualizer: Visualizer, tracks: Tracks, motion: Motion, scale: float) -> None:
+    """Animate one arrow a leg: it starts at the contact, points along the force and is as long."""
+    for leg, name in enumerate(LEGS):
+        node = visualizer["forces"][name]
+        scene.add_arrow(node, FORCE)
+        force = motion.force[:, leg]
+        size = np.linalg.norm(force, axis=1)
+        pushing = size > _SMALLEST_FORCE
+        tracks.add(node, "visible", pushing)
+        direction = np.where(pushing[:, None], force, [0.0, 0.0, 1.0])
+        length = np.where(pushing, scale * size, 1e-3)
+        tracks.add(node, "position", np.where(pushing[:, None], motion.contact[:, leg], 0.0))
+        tracks.add(node, "quaternion", scene.aligning(direction))
+        tracks.add(node, "scale", np.column_stack((np.ones_like(length), length, np.ones_like(length))))
+
+
+def _draw_prints(visualizer: Visualizer, motion: Motion) -> None:
+    """Paint where the legs stood and rolled on the ground."""
+    for count, (leg, mode, start, stop) in enumerate(spans(motion.modes.T)):
+        if mode == SWINGING:
+            continue
+        first, last = motion.contact[start, leg], motion.contact[stop - 1, leg]
+        region = motion.terrain.region_at(*first[:2])
+        normal = [0.0, 0.0, 1.0] if region is None else motion.terrain.regions[region].normal
+        node = visualizer["prints"][f"{LEGS[leg]} {count}"]
+        scene.add_print(node, first, last if mode == 1 else first, normal, MODE_COLOURS[mode])

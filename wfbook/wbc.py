@@ -1,0 +1,329 @@
+"""Chapter 6: from references to motor torques (Paper A, eqs 34–43).
+
+Every two milliseconds a quadratic program asks: which accelerations of trunk and joints, and which
+contact forces, come closest to the references *and* obey the equations of motion, standing feet,
+rolling wheels, friction and the motors' limits? The torques follow.
+
+The unknowns are ``u = [q̈, λ]``: 18 accelerations (:mod:`wfbook.go1_dynamics`) and for each leg the force
+along ``t``, ``b`` and ``n``. The paper carries the torques as unknowns too; eq. 39 gives them from the
+others, so here they are eliminated. Where the paper's program is not usable as printed:
+
+- eq. 38 is singular: several forces do the same work. A small price on λ and q̈ picks one.
+- eq. 35 needs ``w`` *relative to the robot*: in the world, a wheel task fights the rolling itself.
+- eq. 41 needs the turning of the wheel's axle, ``ḃ·v``, or a yawing robot scrubs its wheels sideways.
+- eq. 42 with a traction coefficient would let the program push with wheels that no motor turns.
+- while no foot is down nothing can move the robot along the rolling direction, so no task may ask for it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from wfbook.go1_dynamics import GRAVITY, Go1Dynamics, cross
+from wfbook.qp import QuadraticProgram, Solver
+from wfbook.reference import Gains, Ground, Reference
+
+LEG_COLUMNS = 6 + np.arange(12).reshape(4, 3)
+"""Where the joints of each leg stand in the 18 accelerations."""
+
+_FREE = np.inf
+
+
+@dataclass(frozen=True)
+class Contacts:
+    """The four possible contacts at one state, in their own bases.
+
+    Attributes:
+        basis: ``(4, 3, 3)`` rows t, b, n of each contact in the world.
+        jacobian: ``(4, 3, 18)`` along t, b, n.
+        drift: ``(4, 3)`` the points' accelerations along t, b, n when q̈ is zero.
+        velocity: ``(4, 3)`` along t, b, n.
+        yaw_rate: ``(4,)`` of the calf about n.
+    """
+
+    basis: np.ndarray
+    jacobian: np.ndarray
+    drift: np.ndarray
+    velocity: np.ndarray
+    yaw_rate: np.ndarray
+
+
+def contacts(robot: Go1Dynamics, ground: Ground, wheels: np.ndarray) -> Contacts:
+    """Return the contacts of a robot on a ground (bases of Paper A, eq. 26).
+
+    A foot has the basis of its region. A wheel rolls where it points: t is square to its axle.
+    """
+    n = ground.normals
+    heading = cross(robot.axles, n)
+    heading /= np.linalg.norm(heading, axis=1, keepdims=True)
+    t = np.where(wheels[:, None], heading, ground.tangents)
+    basis = np.stack([t, cross(n, t), n], axis=1)
+    jacobian, drift, velocity = robot.contacts(robot.contact_offsets(n, wheels))
+    local = np.einsum("lij,klj->kli", basis, np.stack([drift, velocity]))
+    return Contacts(basis, basis @ jacobian, local[0], local[1], np.sum(robot.calf_omega * n, axis=1))
+
+
+def base_acceleration(robot: Go1Dynamics, ref: Reference, gains: Gains) -> tuple[np.ndarray, np.ndarray]:
+    """Return the reference accelerations of CoM and trunk (Paper A, eq. 34), each ``(3,)`` in the world.
+
+    The orientation error is the rotation vector from the trunk to its reference; the paper's difference
+    of angles is its limit for small angles.
+    """
+    linear = (
+        ref.com_acceleration
+        + gains.com_kp * (ref.com - robot.com)
+        + gains.com_kd * (ref.com_velocity - robot.com_velocity)
+    )
+    E = ref.R_wb @ robot.R_wb.T
+    error = 0.5 * np.array([E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]])  # sin(angle) · axis
+    omega = robot.R_wb @ robot.velocity[3:6]
+    return linear, gains.attitude_kp * error - gains.attitude_kd * omega
+
+
+def wheel_acceleration(robot: Go1Dynamics, ref: Reference, along: np.ndarray, gains: Gains) -> np.ndarray:
+    """Return how each wheel should accelerate relative to the robot along ``along`` (Paper A, eq. 35).
+
+    ``w`` is the wheel's place relative to the CoM. The paper does not say relative to what; measured in
+    the world, the task holds the wheels where the plan has them and the robot rolls off them.
+
+    Args:
+        robot: at the present state.
+        ref: the reference.
+        along: ``(4, 3)`` rolling directions.
+        gains: of the controller.
+
+    Returns:
+        ``(4,)``.
+    """
+    w = np.sum(along * (robot.centres - robot.com), axis=1)
+    w_d = np.sum(along * (ref.ends - ref.com), axis=1)
+    w_dot = np.sum(along * (robot.centre_velocity - robot.com_velocity), axis=1)
+    return gains.wheel_kp * (w_d - w) - gains.wheel_kd * w_dot
+
+
+def swing_acceleration(robot: Go1Dynamics, ref: Reference, gains: Gains) -> np.ndarray:
+    """Return how each swinging leg's end should accelerate, ``(4, 3)`` in the world (Paper A, eq. 36)."""
+    return (
+        ref.end_acceleration
+        + gains.swing_kp * (ref.ends - robot.centres)
+        + gains.swing_kd * (ref.end_velocity - robot.centre_velocity)
+    )
+
+
+def equations_of_motion(robot: Go1Dynamics, contact: Contacts) -> tuple[np.ndarray, np.ndarray]:
+    """Return ``E`` and ``h`` such that ``E u + h = S τ`` (Paper A, eqs 37 and 39).
+
+    ``E = [M, −Jᵀ]``, ``(18, 30)``. The trunk's six rows have no motor: ``S τ`` is zero there and they are the
+    program's dynamics constraint. The other twelve are the torques. (The paper prints one λ for feet
+    and wheels in eq. 39; they are two, as in eq. 37. Here each leg has one of its own.)
+    """
+    return np.hstack([robot.M, -contact.jacobian.reshape(12, 18).T]), robot.h
+
+
+def stationary_feet(contact: Contacts, damping: float) -> np.ndarray:
+    """Return what ``J q̈`` must be for feet that stay, ``(4, 3)`` along t, b, n (Paper A, eq. 40).
+
+    The paper keeps the velocity of a standing foot constant. A foot that has just landed bounces or slides a
+    little; ``damping`` brings it to rest.
+    """
+    return -contact.drift - damping * contact.velocity
+
+
+def fixed_wheels(contact: Contacts, damping: float) -> np.ndarray:
+    """Return what ``J q̈`` must be for wheels that roll but don't slide, ``(4, 3)`` (Paper A, eq. 41).
+
+    Only the entries along b and n are constraints; rolling is free. The axle turns with the calf, so
+    ``d(b·v)/dt = b·a + ḃ·v`` with ``ḃ = −ω_n t``: without the second term a wheel that rolls and yaws
+    is asked to slide. ``damping`` as for feet.
+    """
+    required = -contact.drift - damping * contact.velocity
+    required[:, 1] += contact.yaw_rate * contact.velocity[:, 0]
+    return required
+
+
+def friction_pyramids(ground: Ground, contact: Contacts, wheels: np.ndarray) -> np.ndarray:
+    """Return ``P`` of each leg, ``(4, 5, 3)`` along t, b, n, so that ``P λ ≤ 0`` (Paper A, eqs 26 and 42).
+
+    A free wheel has no traction to choose: along t it feels rolling resistance alone (eq. 29), against
+    its motion, so its pyramid is flat there.
+    """
+    resistance = ground.rolling_resistance * np.tanh(contact.velocity[:, 0] / 0.02)
+    ahead = np.where(wheels, -resistance, ground.mu_foot)  # the largest λ_t / λ_n
+    behind = np.where(wheels, resistance, ground.mu_foot)  # the largest −λ_t / λ_n
+    aside = np.where(wheels, ground.mu_wheel, ground.mu_foot)
+    P = np.zeros((4, 5, 3))
+    P[:, 0, 0], P[:, 1, 0], P[:, 2, 1], P[:, 3, 1], P[:, 4, 2] = 1.0, -1.0, 1.0, -1.0, -1.0
+    P[:, :4, 2] = -np.stack([ahead, behind, aside, aside], axis=1)
+    return P
+
+
+def tasks(
+    robot: Go1Dynamics, ref: Reference, contact: Contacts, gains: Gains
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return ``G``, ``g`` and weights of the tasks ``‖G q̈ − g‖²`` (Paper A, eq. 38).
+
+    Rows: CoM (3), trunk (3), then three for each leg: a swinging leg's end, a rolling wheel's place, or
+    nothing for a standing foot.
+
+    Returns:
+        ``(18, 18)``, ``(18,)``, ``(18,)``.
+    """
+    G, g, weight = np.zeros((18, 18)), np.zeros(18), np.zeros(18)
+    linear, angular = base_acceleration(robot, ref, gains)
+    basis = np.eye(3)
+    rolling = ref.stance & ref.wheels
+    if np.array_equal(rolling, ref.stance) and rolling.any():
+        basis = contact.basis[np.argmax(rolling)]
+        weight[1:3] = gains.com_weight  # no foot is down: nothing to push with along t
+    else:
+        weight[:3] = gains.com_weight
+    G[:3], g[:3] = basis @ robot.com_jacobian, basis @ (linear - robot.com_drift)
+    G[3:6, 3:6], g[3:6], weight[3:6] = robot.R_wb, angular, gains.attitude_weight
+
+    swing = ~ref.stance
+    wheel_task = wheel_acceleration(robot, ref, contact.basis[:, 0], gains)
+    relative = robot.centre_jacobian - robot.com_jacobian
+    along = np.einsum("li,lij->lj", contact.basis[:, 0], relative)
+    relative_drift = np.sum(contact.basis[:, 0] * (robot.centre_drift - robot.com_drift), axis=1)
+    legs_G, legs_g = G[6:].reshape(4, 3, 18), g[6:].reshape(4, 3)
+    legs_G[swing] = robot.centre_jacobian[swing]
+    legs_g[swing] = (swing_acceleration(robot, ref, gains) - robot.centre_drift)[swing]
+    legs_G[rolling, 0] = along[rolling]
+    legs_g[rolling, 0] = (wheel_task - relative_drift)[rolling]
+    legs_weight = weight[6:].reshape(4, 3)
+    legs_weight[swing] = gains.swing_weight
+    legs_weight[rolling, 0] = gains.wheel_weight
+    return G, g, weight
+
+
+@dataclass(frozen=True)
+class Command:
+    """What the controller decided.
+
+    Attributes:
+        torques: ``(12,)`` of the motors.
+        acceleration: ``(18,)`` q̈.
+        forces: ``(4, 3)`` λ in the world.
+        solved: whether the program was; if not, the rest is the last good command, or damping.
+    """
+
+    torques: np.ndarray
+    acceleration: np.ndarray
+    forces: np.ndarray
+    solved: bool
+
+
+class WholeBodyController:
+    """The quadratic program of Paper A, eqs 38–43, solved at every tick.
+
+    Args:
+        robot: dynamics, which the caller updates before each tick.
+        gains: gains and weights.
+        solver: ``"osqp"``, or ``"daqp"``, an exact active-set method the tests compare with.
+        patience: how many ticks in a row the last good torques are held when a program is not solved. After
+            that the joints are only damped, and the robot sits down.
+
+    Attributes:
+        failures: how many programs were not solved.
+    """
+
+    def __init__(
+        self, robot: Go1Dynamics, gains: Gains | None = None, solver: Solver = "osqp", patience: int = 10
+    ) -> None:
+        self.robot = robot
+        self.gains = gains or Gains()
+        self.patience = patience
+        self.failures = 0
+        self._misses = 0
+        self._last: Command | None = None
+        self._program = QuadraticProgram(*_pattern(), solver)
+
+    def problem(
+        self, ref: Reference, ground: Ground
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, Contacts]:
+        """Return the program of Paper A, eqs 38–43, at the robot's state.
+
+        Returns:
+            P ``(30, 30)``, q ``(30,)``, A ``(50, 30)``, l and c ``(50,)`` of ``min ½ uᵀP u + qᵀu`` subject to
+            ``l ≤ A u ≤ c``, and the contacts.
+        """
+        robot, gains = self.robot, self.gains
+        contact = contacts(robot, ground, ref.wheels)
+        G, g, weight = tasks(robot, ref, contact, gains)
+        P, q = np.zeros((30, 30)), np.zeros(30)
+        weighted = G.T * weight
+        P[:18, :18] = weighted @ G
+        q[:18] = -weighted @ g
+        P[np.arange(30), np.arange(30)] += [gains.acceleration_weight] * 18 + [gains.force_weight] * 12
+        q[18:] = -gains.force_weight * np.einsum("lij,lj->li", contact.basis, ref.forces).ravel()
+
+        A, lower, upper = np.zeros((50, 30)), np.full(50, -_FREE), np.full(50, _FREE)
+        E, h = equations_of_motion(robot, contact)
+        A[:6], lower[:6], upper[:6] = E[:6], -h[:6], -h[:6]
+
+        A[6:18, :18] = contact.jacobian.reshape(12, 18)
+        required = np.where(
+            ref.wheels[:, None],
+            fixed_wheels(contact, gains.contact_damping),
+            stationary_feet(contact, gains.contact_damping),
+        )
+        held = np.repeat(ref.stance[:, None], 3, axis=1)
+        held[:, 0] &= ~ref.wheels
+        lower[6:18] = np.where(held, required, -_FREE).ravel()
+        upper[6:18] = np.where(held, required, _FREE).ravel()
+
+        pyramids = friction_pyramids(ground, contact, ref.wheels)
+        for leg in range(4):
+            A[18 + 5 * leg : 23 + 5 * leg, 18 + 3 * leg : 21 + 3 * leg] = pyramids[leg]
+        upper[18:38] = 0.0
+        upper[22:38:5] = np.where(ref.stance, -gains.least_force, 0.0)
+        lower[22:38:5] = np.where(ref.stance, -_FREE, 0.0)  # a leg in the air presses on nothing
+
+        A[38:] = E[6:]
+        lower[38:], upper[38:] = -robot.effort - h[6:], robot.effort - h[6:]
+        return P, q, A, lower, upper, contact
+
+    def tick(self, ref: Reference, ground: Ground) -> Command:
+        """Solve for the torques at the robot's present state."""
+        *program, contact = self.problem(ref, ground)
+        u = self._program.solve(*program)
+        if u is None:
+            return self._without_solution()
+        torques = program[2][38:] @ u + self.robot.h[6:]
+        torques = np.clip(torques, -self.robot.effort, self.robot.effort)
+        forces = np.einsum("lij,li->lj", contact.basis, u[18:].reshape(4, 3))
+        self._misses = 0
+        self._last = Command(torques, u[:18], forces, True)
+        return self._last
+
+    def _without_solution(self) -> Command:
+        """Hold the last good torques for a while, then only damp the joints."""
+        self.failures += 1
+        self._misses += 1
+        if self._last is not None and self._misses <= self.patience:
+            return Command(self._last.torques, self._last.acceleration, self._last.forces, False)
+        return Command(-2.0 * self.robot.velocity[6:], np.zeros(18), np.zeros((4, 3)), False)
+
+
+def _pattern() -> tuple[np.ndarray, np.ndarray]:
+    """Return where P and A can be non-zero, whatever the mode: ``(30, 30)`` and ``(50, 30)`` bool."""
+    P, A = np.zeros((30, 30), bool), np.zeros((50, 30), bool)
+    P[:18, :18] = True
+    P[np.arange(30), np.arange(30)] = True
+    A[:6] = True
+    for leg in range(4):
+        own = np.r_[0:6, LEG_COLUMNS[leg]]
+        force = np.arange(18 + 3 * leg, 21 + 3 * leg)
+        for axis in range(3):
+            A[6 + 3 * leg + axis, own] = True
+            A[38 + 3 * leg + axis, np.r_[own, force]] = True
+        rows = 18 + 5 * leg + np.arange(5)
+        A[rows, force[[0, 0, 1, 1, 2]]] = True
+        A[rows[:4], force[2]] = True
+    return P, A
+
+
+def weight_share(robot: Go1Dynamics, acceleration: np.ndarray, stance: np.ndarray) -> np.ndarray:
+    """Return forces that share weight and acceleration among the standing legs evenly, ``(4, 3)``."""
+    total = robot.mass * (acceleration - GRAVITY)
+    return np.where(stance[:, None], total / max(stance.sum(), 1), 0.0)
