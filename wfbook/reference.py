@@ -33,13 +33,13 @@ class Gains:
     com_kd: np.ndarray = field(default_factory=lambda: np.array([28.0, 28.0, 40.0]))
     attitude_kp: np.ndarray = field(default_factory=lambda: np.array([800.0, 800.0, 400.0]))
     attitude_kd: np.ndarray = field(default_factory=lambda: np.array([56.0, 56.0, 40.0]))
-    wheel_kp: float = 60.0
-    wheel_kd: float = 16.0
+    wheel_kp: float = 150.0
+    wheel_kd: float = 24.0
     swing_kp: float = 400.0
     swing_kd: float = 40.0
     com_weight: float = 1000.0
     attitude_weight: float = 3.0
-    wheel_weight: float = 3.0
+    wheel_weight: float = 30.0
     swing_weight: float = 10.0
     contact_damping: float = 40.0
     least_force: float = 3.0
