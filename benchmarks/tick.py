@@ -1,6 +1,6 @@
 """How long a control tick takes, part by part: ``python benchmarks/tick.py``.
 
-The states are those of a disturbed robot in a diagonal stance, one swing leg about to land on a wheel.
+The robot stands on two wheels and a foot, swings the fourth leg and sways at 1.5 Hz.
 """
 
 import time
@@ -34,7 +34,11 @@ def main() -> None:
     ends = nominal()["hip_offsets"] + np.array([0.0, 0.0, 0.265 + FOOT_RADIUS])
     com = np.array([0.0, 0.0, 0.265])
     qpos = robot.posture(com, np.zeros(3), ends)
-    states = [(qpos + 0.01 * rng.standard_normal(23), 0.1 * rng.standard_normal(22)) for _ in range(COUNT)]
+    phases, sway = rng.uniform(0.0, 2 * np.pi, (2, 23)), 2 * np.pi * 1.5 * 0.002
+    states = [
+        (qpos + 0.01 * np.sin(sway * i + phases[0]), 0.1 * np.cos(sway * i + phases[1, :22]))
+        for i in range(COUNT)
+    ]
     for q, _ in states:
         q[3:7] /= np.linalg.norm(q[3:7])
     stance, wheels = np.array([True, False, True, True]), np.array([False, True, True, False])

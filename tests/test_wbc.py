@@ -76,7 +76,7 @@ def test_the_answer_obeys_the_physics(robot, ground, mode, seed):
     t, b, n = forces.T
     least = Gains().least_force
     assert np.all(n[ref.stance] >= least - 1e-3)
-    mu_b = np.where(ref.wheels, ground.mu_wheel, ground.mu_foot)
+    mu_b = np.where(ref.wheels, ground.mu_wheel_lateral, ground.mu_foot)
     assert np.all(np.abs(b) <= mu_b * n + 1e-3)
     assert np.all(np.abs(t[~ref.wheels]) <= (ground.mu_foot * n)[~ref.wheels] + 1e-3)
     rolling = ref.wheels & ref.stance

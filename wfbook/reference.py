@@ -31,8 +31,8 @@ class Gains:
 
     com_kp: np.ndarray = field(default_factory=lambda: np.array([200.0, 200.0, 400.0]))
     com_kd: np.ndarray = field(default_factory=lambda: np.array([28.0, 28.0, 40.0]))
-    attitude_kp: np.ndarray = field(default_factory=lambda: np.array([800.0, 800.0, 400.0]))
-    attitude_kd: np.ndarray = field(default_factory=lambda: np.array([56.0, 56.0, 40.0]))
+    attitude_kp: np.ndarray = field(default_factory=lambda: np.array([560.0, 560.0, 400.0]))
+    attitude_kd: np.ndarray = field(default_factory=lambda: np.array([47.0, 47.0, 40.0]))
     wheel_kp: float = 150.0
     wheel_kd: float = 24.0
     swing_kp: float = 400.0
@@ -55,14 +55,14 @@ class Ground:
         normals: ``(4, 3)`` unit normals n.
         tangents: ``(4, 3)`` unit rolling directions t.
         mu_foot: ``(4,)`` friction coefficient of a foot.
-        mu_wheel: ``(4,)`` of a wheel along its axle.
+        mu_wheel_lateral: ``(4,)`` of a wheel along its axle.
         rolling_resistance: ``(4,)`` resisting over normal force.
     """
 
     normals: np.ndarray
     tangents: np.ndarray
     mu_foot: np.ndarray
-    mu_wheel: np.ndarray
+    mu_wheel_lateral: np.ndarray
     rolling_resistance: np.ndarray
 
     @classmethod

@@ -150,7 +150,7 @@ def friction_pyramids(ground: Ground, contact: Contacts, wheels: np.ndarray) -> 
     resistance = ground.rolling_resistance * np.tanh(contact.velocity[:, 0] / 0.02)
     ahead = np.where(wheels, -resistance, ground.mu_foot)  # the largest λ_t / λ_n
     behind = np.where(wheels, resistance, ground.mu_foot)  # the largest −λ_t / λ_n
-    aside = np.where(wheels, ground.mu_wheel, ground.mu_foot)
+    aside = np.where(wheels, ground.mu_wheel_lateral, ground.mu_foot)
     P = np.zeros((4, 5, 3))
     P[:, 0, 0], P[:, 1, 0], P[:, 2, 1], P[:, 3, 1], P[:, 4, 2] = 1.0, -1.0, 1.0, -1.0, -1.0
     P[:, :4, 2] = -np.stack([ahead, behind, aside, aside], axis=1)

@@ -6,6 +6,7 @@ same time, so the bound of its relaxation is weak and the search long.
 """
 
 import time
+import warnings
 from itertools import combinations
 from typing import Any
 
@@ -184,7 +185,10 @@ def solve(problem: Problem, gap: float, time_limit: float) -> Plan:
         if model.getStatus() == "userinterrupt":
             raise KeyboardInterrupt
         raise NoPlanError(f"no plan found within {spent:.1f} s")
-    stated.unpack_results(answer, chain, inverse)
+    with warnings.catch_warnings():
+        # "May be inaccurate" is how CVXPY calls a gap or time limit; the plan's meta says which it was.
+        warnings.simplefilter("ignore", UserWarning)
+        stated.unpack_results(answer, chain, inverse)
     S = np.rint(program.S.value)
     wheel = np.rint(program.wheel.value) if problem.wheels else np.zeros_like(S)
     objective, bound = float(stated.value), min(model.getDualbound() + _offset(inverse), float(stated.value))

@@ -152,17 +152,17 @@ class Conic:
 
 
 class Boxed:
-    """A compiled program whose ``box`` variable is bounded anew at each solve, without a new set-up."""
+    """A compiled program some of whose variables are bounded anew at each solve, without a new set-up."""
 
-    def __init__(self, conic: Conic, box: Any):
+    def __init__(self, conic: Conic, columns: np.ndarray):
         """Set the solver up once.
 
         Args:
             conic: the program.
-            box: CVXPY variable, one-dimensional, that will be bounded.
+            columns: of the variables that will be bounded; a solution's ``y`` holds these only.
         """
         self._offset, self._cutoff = conic.offset, np.inf
-        columns = conic.columns(box)
+        self._columns = columns
         n = len(columns)
         pick = sparse.csc_matrix((np.ones(n), (np.arange(n), columns)), shape=(n, conic.A.shape[1]))
         A = sparse.vstack([conic.A, pick, -pick], format="csc")
@@ -199,4 +199,5 @@ class Boxed:
         result = self._solver.solve()
         if result.status == _STATUS.CallbackTerminated:
             return Solution("cut", np.nan, cutoff, np.zeros(0))
-        return _read(result, self._offset)
+        found = _read(result, self._offset)
+        return replace(found, y=found.y[self._columns])

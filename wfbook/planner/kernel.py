@@ -16,6 +16,7 @@ from wfbook.planner.conic import Boxed, Conic, Solution
 from wfbook.planner.presolve import solve_fixed
 from wfbook.planner.problem import Problem
 from wfbook.planner.program import Program
+from wfbook.planner.worker import Worker, available
 
 INTEGRAL = 1e-5
 """How close to an integer counts as one."""
@@ -64,6 +65,7 @@ class Kernel:
         leaves: exact programs solved so far.
         pruned: the lowest bound of any box that was put aside for exceeding a cutoff. What is proven at
             the end is no more than this.
+        parallel: use a second core, if there is one; results are the same.
     """
 
     problem: Problem
@@ -73,6 +75,7 @@ class Kernel:
     qps: int = 0
     leaves: int = 0
     pruned: float = np.inf
+    parallel: bool = True
 
     def __post_init__(self):
         problem = self.problem
@@ -97,7 +100,9 @@ class Kernel:
             [self._qp_conic.columns(v).ravel() for v in relaxed.discrete.values()]
         )
         self._qp_keys = list(relaxed.discrete)
-        self._qp = Boxed(self._symmetry_broken(), self._box)
+        searched = self._symmetry_broken()
+        self._qp = Boxed(searched, self._columns)
+        self._worker = Worker(searched, self._columns) if self.parallel and available() else None
         self._bounds: dict[bytes, Solution] = {}
         self._leaves: dict[bytes, Solution] = {}
         # Sum of relative gains, and how many were seen, for each variable down and up.
@@ -193,16 +198,39 @@ class Kernel:
             upper: its upper vector.
             cutoff: stop as soon as the bound is known to be higher.
         """
-        key = np.concatenate([lower, upper]).astype(np.int16).tobytes()
-        known = self._bounds.get(key)
-        if known is None or (known.status == "cut" and known.bound < cutoff):
+        found = self._known(lower, upper, cutoff)
+        if found is None:
             self.qps += 1
-            known = self._bounds[key] = self._qp.solve(lower.astype(float), upper.astype(float), cutoff)
-        return known
+            found = self._qp.solve(lower.astype(float), upper.astype(float), cutoff)
+            self._bounds[_key(lower, upper)] = found
+        return found
+
+    def close(self) -> None:
+        """End the worker process; the kernel goes on without it."""
+        if self._worker is not None:
+            self._worker.close()
+            self._worker = None
+
+    def _bound_both(self, children: list, cutoff: float) -> None:
+        """Bound two boxes at once, where neither is known and there is a second core."""
+        if self._worker is None or any(c is None or self._known(*c, cutoff) for c in children):
+            return
+        lower, upper = (side.astype(float) for side in children[1])
+        self._worker.ask(lower, upper, cutoff)
+        try:
+            self.bound(*children[0], cutoff)
+        finally:  # whatever happens here, the next answer must be the next question's
+            self._bounds[_key(*children[1])] = self._worker.answer()
+        self.qps += 1
+
+    def _known(self, lower: np.ndarray, upper: np.ndarray, cutoff: float) -> Solution | None:
+        """Return what is remembered of a box, if it says enough."""
+        found = self._bounds.get(_key(lower, upper))
+        return None if found is None or (found.status == "cut" and found.bound < cutoff) else found
 
     def values(self, solution: Solution) -> np.ndarray:
         """Return the branching variables' values in a relaxation's solution."""
-        return solution.y[self._columns]
+        return solution.y
 
     def gait(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return swing matrix and wheel's dynamics matrix, ``(L, J)`` integers, of a vector."""
@@ -286,6 +314,7 @@ class Kernel:
             if best is not None and (tried >= _STRONG or (reliable and tried >= 2)):
                 break
             children = self._children(lower, upper, index, z[index])
+            self._bound_both(children, cutoff)
             gains = [
                 self._observe(child, index, side, solution, cutoff) for side, child in enumerate(children)
             ]
@@ -353,6 +382,11 @@ def _narrow_sums(S_low: np.ndarray, S_up: np.ndarray, C_low: np.ndarray, C_up: n
         if j:
             np.maximum(C_low[:, j - 1], C_low[:, j] - S_up[:, j], out=C_low[:, j - 1])
             np.minimum(C_up[:, j - 1], C_up[:, j] - S_low[:, j], out=C_up[:, j - 1])
+
+
+def _key(lower: np.ndarray, upper: np.ndarray) -> bytes:
+    """Return a key for a box."""
+    return np.concatenate([lower, upper]).astype(np.int16).tobytes()
 
 
 def gait_key(S: np.ndarray, wheel: np.ndarray) -> bytes:

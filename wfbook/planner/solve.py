@@ -1,5 +1,6 @@
 """Solve a planning problem: formulation, search, plan; then the gait that can also be executed."""
 
+import contextlib
 import time
 from collections.abc import Callable, Iterator
 
@@ -50,7 +51,8 @@ def solve(
     _check_limits(gap, time_limit)
     if formulation == "paper":
         return bigm.solve(problem, gap, time_limit)
-    return Search(problem, gap, time_limit, progress).run()
+    with contextlib.closing(Search(problem, gap, time_limit, progress)) as search:
+        return search.run()
 
 
 def solve_executable(
@@ -87,7 +89,12 @@ def solve_executable(
                 "the paper formulation's gait can't be polished; formulation='tight' searches on"
             )
         return relaxed, polished
-    search = Search(problem, gap, time_limit, progress)
+    with contextlib.closing(Search(problem, gap, time_limit, progress)) as search:
+        return _first_executable(search, polisher)
+
+
+def _first_executable(search: "Search", polisher: Polisher) -> tuple[Plan, Plan]:
+    """Return the best gait that can be polished, as a relaxed and a polished plan."""
     while True:
         relaxed = search.run()
         polished = polisher.polish(relaxed)
@@ -139,6 +146,10 @@ class Search:
     def exclude(self, plan: Plan) -> None:
         """Cut a plan's gait off."""
         self.kernel.excluded.add(gait_key(plan.S, plan.end_effector))
+
+    def close(self) -> None:
+        """End the worker process."""
+        self.kernel.close()
 
     def run(self) -> Plan:
         """Search with the time that is left (see :func:`solve`)."""
