@@ -118,7 +118,7 @@ def test_the_relaxation_is_below_every_leaf_and_rises_as_boxes_shrink():
         box = kernel.propagate(low, high)
         assert box is not None
         assert (box[0] <= z).all() and (z <= box[1]).all(), "propagation lost a gait of the box"
-        below, here = kernel.bound(*box), kernel.gait_bound(S, wheel)
+        below, here = kernel.bound(*box), kernel.gait_bounds([(S, wheel)])[0]
         assert kernel.bound(*root).bound <= below.bound + 1e-4
         assert below.bound <= here + 1e-4
         assert here <= leaf.value + 1e-6

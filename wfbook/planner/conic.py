@@ -1,6 +1,7 @@
 """Convex programs that are solved again and again: compiled once by CVXPY, solved by Clarabel."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import clarabel
@@ -140,6 +141,11 @@ class Conic:
             equalities=self.equalities + len(equal_b),
             inequalities=self.inequalities + len(below_b),
         )
+
+    @cached_property
+    def linear(self) -> sparse.csr_matrix:
+        """Rows of equalities and inequalities, by rows."""
+        return self.A[: self.equalities + self.inequalities].tocsr()
 
     @property
     def all_cones(self) -> list[Any]:

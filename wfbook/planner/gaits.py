@@ -1,6 +1,6 @@
 """Gaits a roboticist would try first, and small changes to a gait: the search's primal heuristics."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
@@ -10,8 +10,9 @@ from wfbook.planner.problem import Problem
 TROT = ((0, 3), (1, 2))
 CRAWL = ((2,), (0,), (3,), (1,))
 
-_EXACT = 3  # templates that are solved exactly
-_ROUNDS = 6  # of the local search
+_EXACT = 2  # gaits solved exactly in each round of the local search
+_ROUNDS = 6
+_BATCH = 8  # gaits bounded between two looks at the clock
 
 Gait = tuple[np.ndarray, np.ndarray]
 
@@ -109,38 +110,29 @@ def improve(
     problem, seen = kernel.problem, set()
     symmetric = mirror_symmetric(problem)
 
-    def score(gait: Gait) -> float:
-        image = mirrored(gait)
-        key = gait_key(*gait)
-        if stop() or key in seen or (symmetric and gait_key(*image) in seen) or not kernel.admissible(*gait):
-            return np.inf
-        seen.add(key)
-        return kernel.gait_bound(*gait)
+    def ranked(gaits: Iterable[Gait], below: float) -> list[Gait]:
+        """Return the gaits not seen before whose QP bound is below a value, the lowest first."""
+        fresh = []
+        for gait in gaits:
+            keys = {gait_key(*gait)} | ({gait_key(*mirrored(gait))} if symmetric else set())
+            if not (keys & seen) and kernel.admissible(*gait):
+                seen.update(keys)
+                fresh.append(gait)
+        bounds: list[float] = []
+        for i in range(0, len(fresh), _BATCH):
+            if stop():
+                break
+            bounds += kernel.gait_bounds(fresh[i : i + _BATCH])
+        order = sorted(range(len(bounds)), key=lambda i: (bounds[i], i))
+        return [fresh[i] for i in order if bounds[i] < below]
 
-    ranked = [(score(gait), i, gait) for i, gait in enumerate(templates(problem))]
-    ranked = sorted((r for r in ranked if np.isfinite(r[0])), key=lambda r: r[:2])
     best, current = np.inf, None
-    for bound, _, gait in ranked[:_EXACT]:
-        if bound < best:
-            value = kernel.leaf(*gait).value
-            if value < best:
-                best, current = value, gait
-                yield best, *gait
     for _ in range(_ROUNDS):
-        if current is None:
+        tried = ranked(templates(problem) if current is None else neighbours(problem, *current), best)[
+            :_EXACT
+        ]
+        costs = kernel.price(tried)
+        if not costs or min(costs) >= best or stop():
             return
-        ranked = sorted(
-            ((score(gait), i, gait) for i, gait in enumerate(neighbours(problem, *current))),
-            key=lambda r: r[:2],
-        )
-        improved = False
-        for bound, _, gait in ranked:
-            if bound >= best or stop():
-                break
-            value = kernel.leaf(*gait).value
-            if value < best:
-                best, current, improved = value, gait, True
-                yield best, *gait
-                break
-        if not improved:
-            return
+        best, current = min(costs), tried[int(np.argmin(costs))]
+        yield best, *current

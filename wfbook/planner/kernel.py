@@ -5,7 +5,9 @@ over all branching variables: ``S[l, j]``, ``wheel[l, j]`` and two kinds of sums
 than single binaries: ``C[l, j]``, the swings of leg ``l`` up to slot ``j``, and ``T[j] = Σ_l C[l, j]``.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import cvxpy as cp
 import numpy as np
@@ -21,8 +23,8 @@ from wfbook.planner.worker import Worker, available
 INTEGRAL = 1e-5
 """How close to an integer counts as one."""
 
-_STRONG = 6  # candidates whose children are solved before one is chosen
-_RELIABLE = 2  # after so many observations a pseudo-cost is believed
+_STRONG = 5  # candidates whose children are solved before one is chosen
+_RELIABLE = 1  # after so many observations a pseudo-cost is believed
 
 
 @dataclass
@@ -65,7 +67,6 @@ class Kernel:
         leaves: exact programs solved so far.
         pruned: the lowest bound of any box that was put aside for exceeding a cutoff. What is proven at
             the end is no more than this.
-        parallel: use a second core, if there is one; results are the same.
     """
 
     problem: Problem
@@ -75,7 +76,6 @@ class Kernel:
     qps: int = 0
     leaves: int = 0
     pruned: float = np.inf
-    parallel: bool = True
 
     def __post_init__(self):
         problem = self.problem
@@ -100,14 +100,13 @@ class Kernel:
             [self._qp_conic.columns(v).ravel() for v in relaxed.discrete.values()]
         )
         self._qp_keys = list(relaxed.discrete)
-        searched = self._symmetry_broken()
-        self._qp = Boxed(searched, self._columns)
-        self._worker = Worker(searched, self._columns) if self.parallel and available() else None
+        self._qp = Boxed(self._symmetry_broken(), self._columns)
         self._bounds: dict[bytes, Solution] = {}
         self._leaves: dict[bytes, Solution] = {}
         # Sum of relative gains, and how many were seen, for each variable down and up.
         self._gain = np.zeros((2, self.layout.size))
         self._seen = np.zeros((2, self.layout.size))
+        self._worker: Worker | None = None
         self._members = np.array([[leg in p for p in problem.patterns] for leg in range(problem.legs)])
 
     def _symmetry_broken(self) -> Conic:
@@ -201,9 +200,13 @@ class Kernel:
         found = self._known(lower, upper, cutoff)
         if found is None:
             self.qps += 1
-            found = self._qp.solve(lower.astype(float), upper.astype(float), cutoff)
-            self._bounds[_key(lower, upper)] = found
+            found = self._bounds[_key(lower, upper)] = self._solve(lower, upper, cutoff)
         return found
+
+    def open(self) -> None:
+        """Start the worker process, if there is a second core for it; results are the same without."""
+        if self._worker is None and available():
+            self._worker = Worker(self._work)
 
     def close(self) -> None:
         """End the worker process; the kernel goes on without it."""
@@ -211,17 +214,33 @@ class Kernel:
             self._worker.close()
             self._worker = None
 
-    def _bound_both(self, children: list, cutoff: float) -> None:
-        """Bound two boxes at once, where neither is known and there is a second core."""
-        if self._worker is None or any(c is None or self._known(*c, cutoff) for c in children):
-            return
-        lower, upper = (side.astype(float) for side in children[1])
-        self._worker.ask(lower, upper, cutoff)
+    def _work(self, method: str, tasks: list[tuple]) -> list[Any]:
+        """Do a share of the work, in the worker process or here."""
+        return [getattr(self, method)(*task) for task in tasks]
+
+    def _shared(self, method: Callable[..., Any], tasks: list[tuple]) -> list[Any]:
+        """Call a method for each task, every other one in the worker process if there is one."""
+        if self._worker is None or len(tasks) < 2:
+            return self._work(method.__name__, tasks)
+        self._worker.ask(method.__name__, tasks[1::2])
+        results: list[Any] = [None] * len(tasks)
         try:
-            self.bound(*children[0], cutoff)
+            results[::2] = self._work(method.__name__, tasks[::2])
         finally:  # whatever happens here, the next answer must be the next question's
-            self._bounds[_key(*children[1])] = self._worker.answer()
-        self.qps += 1
+            results[1::2] = self._worker.answer()
+        return results
+
+    def _solve(self, lower: np.ndarray, upper: np.ndarray, cutoff: float) -> Solution:
+        return self._qp.solve(lower.astype(float), upper.astype(float), cutoff)
+
+    def _bound_both(self, children: list, cutoff: float) -> None:
+        """Bound two boxes at once, where neither is known yet."""
+        if any(c is None or self._known(*c, cutoff) for c in children):
+            return
+        self.qps += 2
+        found = self._shared(self._solve, [(*child, cutoff) for child in children])
+        for child, solution in zip(children, found, strict=True):
+            self._bounds[_key(*child)] = solution
 
     def _known(self, lower: np.ndarray, upper: np.ndarray, cutoff: float) -> Solution | None:
         """Return what is remembered of a box, if it says enough."""
@@ -254,10 +273,21 @@ class Kernel:
             return Solution("infeasible", np.inf, np.inf, np.zeros(0))
         if key not in self._leaves:
             self.leaves += 1
-            assigned = tight.assignment(self.problem, S, wheel)
-            fixed = np.concatenate([assigned[k].ravel() for k in self.program.discrete])
-            self._leaves[key] = solve_fixed(self.conic, self._discrete, fixed)
+            self._leaves[key] = self._exact(S, wheel)
         return self._leaves[key]
+
+    def price(self, gaits: list[tuple[np.ndarray, np.ndarray]]) -> list[float]:
+        """Return the exact costs of gaits; infinite where infeasible or excluded."""
+        fresh = [g for g in gaits if gait_key(*g) not in self._leaves and gait_key(*g) not in self.excluded]
+        for gait, found in zip(fresh, self._shared(self._exact, fresh), strict=True):
+            self._leaves[gait_key(*gait)] = found
+        self.leaves += len(fresh)
+        return [self.leaf(*gait).value for gait in gaits]
+
+    def _exact(self, S: np.ndarray, wheel: np.ndarray) -> Solution:
+        assigned = tight.assignment(self.problem, S, wheel)
+        fixed = np.concatenate([assigned[k].ravel() for k in self.program.discrete])
+        return solve_fixed(self.conic, self._discrete, fixed)
 
     def priced(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """Return the feasible gaits that were solved exactly, the cheapest first."""
@@ -266,9 +296,12 @@ class Kernel:
         gaits = [np.frombuffer(key, np.int8).reshape(shape).astype(int) for _, key in sorted(feasible)]
         return [(S, wheel) for S, wheel in gaits]
 
-    def gait_bound(self, S: np.ndarray, wheel: np.ndarray) -> float:
-        """Return the QP's lower bound of the cost of one gait."""
-        self.qps += 1
+    def gait_bounds(self, gaits: list[tuple[np.ndarray, np.ndarray]]) -> list[float]:
+        """Return the QP's lower bounds of the costs of gaits."""
+        self.qps += len(gaits)
+        return self._shared(self._gait_bound, gaits)
+
+    def _gait_bound(self, S: np.ndarray, wheel: np.ndarray) -> float:
         assigned = tight.assignment(self.problem, S, wheel)
         fixed = np.concatenate([assigned[k].ravel() for k in self._qp_keys])
         return solve_fixed(self._qp_conic, self._qp_discrete, fixed).bound

@@ -29,7 +29,7 @@ def solve_fixed(conic: Conic, columns: np.ndarray, values: np.ndarray) -> Soluti
     y, known = np.zeros(n), np.zeros(n, bool)
     y[columns], known[columns] = values, True
     zero, nonneg = conic.equalities, conic.inequalities
-    linear = conic.A[: zero + nonneg].tocsr()
+    linear = conic.linear
     equal = np.arange(zero + nonneg) < zero
     keep = np.ones(zero + nonneg, bool)
     b = conic.b[: zero + nonneg]

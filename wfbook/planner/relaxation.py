@@ -60,15 +60,17 @@ def build(problem: Problem) -> Relaxation:
 
     x, v, a = ([cp.Variable(n) for _ in range(3)] for n in (K + 1, K + 1, K))
     height = problem.ground + robot.height
+    rise = x[2]
+    x[2] = height + rise
     place = (*problem.start, height)
     constraints += [r == 0 for r in midpoint_integration(x, v, a, dt)]
     constraints += [x[i][0] == place[i] for i in range(3)] + [v[i][0] == 0 for i in range(3)]
-    constraints += [v[0] <= limits.speed[0], v[0] >= -limits.speed[1], *within(x[2] - height, robot.reach[2])]
+    constraints += [v[0] <= limits.speed[0], v[0] >= -limits.speed[1], *within(rise, robot.reach[2])]
     if problem.final_stance:
         constraints += [v[i][K] == 0 for i in range(3)] + [S[:, -1] == 0]
     cost += w.goal * sum(cp.square(x[i][K] - problem.goal[i]) for i in range(2))
     cost += w.acceleration * sum(cp.sum_squares(a[i]) for i in range(3))
-    cost += w.height * cp.sum_squares(x[2][1:] - height)
+    cost += w.height * cp.sum_squares(rise)
 
     force_cost, force_rows = _forces(problem, a, stance, sizes)
     lever_cost, lever_rows = _levers(problem, x, S, stance, landing, sizes)
@@ -84,13 +86,12 @@ def _forces(problem: Problem, a: list[Any], stance: dict, sizes: Any) -> tuple[A
     weight = problem.weights.force + 4 * problem.weights.bounds
     counts = L - np.arange(sizes.shape[0])
     chosen = spread @ sizes.T
-    parts = cp.Variable((K, sizes.shape[0]), nonneg=True)
+    # The variable is what is squared, for CVXPY gives the square of anything else a variable of its own.
+    squared = cp.Variable((K, sizes.shape[0]))
+    parts = squared @ np.diag(np.sqrt(counts)) - 1 + chosen
     along, across = cp.Variable(K), cp.Variable(K)
-    rows = [parts <= problem.limits.force * chosen @ np.diag(counts)]
-    scale = np.diag(1.0 / np.sqrt(counts))
-    cost = weight * (
-        cp.sum_squares((parts + 1 - chosen) @ scale) - cp.sum((1 - chosen) @ np.diag(1.0 / counts))
-    )
+    rows = [parts >= 0, parts <= problem.limits.force * chosen @ np.diag(counts)]
+    cost = weight * (cp.sum_squares(squared) - cp.sum((1 - chosen) @ np.diag(1.0 / counts)))
     normal = cp.sum(parts, axis=1)
     on_wheels = 0
     if problem.wheels:

@@ -155,6 +155,7 @@ class Search:
         """Search with the time that is left (see :func:`solve`)."""
         kernel = self.kernel
         kernel.pruned = np.inf
+        kernel.open()
         tree = Tree(kernel, self.gap, self._left, self.progress)
         status, bound, nodes = tree.run()
         self._left = max(self._left - tree.elapsed, 1e-3)

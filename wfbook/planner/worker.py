@@ -1,8 +1,8 @@
-"""A second core for the search: solves one child of a split while this process solves the other.
+"""A second core for the search: a forked process that does half of what can be done at once.
 
 Clarabel holds Python's lock while it works, so threads do not help. The worker is forked with the
-compiled program in place and gets only a pair of vectors at a time. What is solved where depends on the
-search alone, not on time, so runs repeat.
+compiled programs in place, so that only small vectors travel. What is done where depends on the search
+alone, not on time, so runs repeat.
 """
 
 import contextlib
@@ -10,36 +10,33 @@ import multiprocessing
 import os
 import signal
 import weakref
+from collections.abc import Callable
 from multiprocessing.connection import Connection
-
-import numpy as np
-
-from wfbook.planner.conic import Boxed, Conic, Solution
+from typing import Any
 
 
 class Worker:
-    """A forked process that solves a boxed program."""
+    """A forked process that calls one function again and again."""
 
-    def __init__(self, conic: Conic, box: np.ndarray):
+    def __init__(self, function: Callable[..., Any]):
         """Start the process.
 
         Args:
-            conic: the program.
-            box: columns of the boxed variables; of ``y`` only these are sent back.
+            function: what it calls; arguments and results travel, all else is as it was at the fork.
         """
         context = multiprocessing.get_context("fork")
         self._pipe, far = context.Pipe()
-        process = context.Process(target=_serve, args=(far, self._pipe, conic, box), daemon=True)
+        process = context.Process(target=_serve, args=(far, self._pipe, function), daemon=True)
         process.start()
         far.close()
         self._close = weakref.finalize(self, _stop, self._pipe, process)
 
-    def ask(self, lower: np.ndarray, upper: np.ndarray, cutoff: float) -> None:
-        """Begin to solve (see :meth:`.conic.Boxed.solve`)."""
-        self._pipe.send((lower, upper, cutoff))
+    def ask(self, *arguments: Any) -> None:
+        """Begin a call."""
+        self._pipe.send(arguments)
 
-    def answer(self) -> Solution:
-        """Wait for the solution; its ``y`` holds the boxed variables only."""
+    def answer(self) -> Any:
+        """Wait for the call's result."""
         return self._pipe.recv()
 
     def close(self) -> None:
@@ -52,13 +49,12 @@ def available() -> bool:
     return hasattr(os, "fork") and len(os.sched_getaffinity(0)) > 1
 
 
-def _serve(pipe: Connection, theirs: Connection, conic: Conic, box: np.ndarray) -> None:
+def _serve(pipe: Connection, theirs: Connection, function: Callable[..., Any]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt is the search's to handle
     theirs.close()
-    program = Boxed(conic, box)
     with contextlib.suppress(EOFError, OSError):
-        while (question := pipe.recv()) is not None:
-            pipe.send(program.solve(*question))
+        while (arguments := pipe.recv()) is not None:
+            pipe.send(function(*arguments))
 
 
 def _stop(pipe: Connection, process: multiprocessing.Process) -> None:
