@@ -9,7 +9,6 @@ import re
 import signal
 import subprocess
 import sys
-import zlib
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -211,11 +210,7 @@ def _given_plan(arguments: argparse.Namespace) -> "Plan":
     from wfbook.planner import Plan
 
     with _wrong_input():
-        try:
-            plan = Plan.load(arguments.plan)
-        except (NotImplementedError, RuntimeError, zlib.error) as error:
-            # What zipfile raises where a damaged header asks for encryption or an unknown compression.
-            raise ValueError(f"{arguments.plan}: not a plan file, or damaged ({error})") from None
+        plan = Plan.load(arguments.plan)
         asked = arguments.terrain and ground.named_or_file(arguments.terrain)
     if asked and asked != plan.terrain:
         raise CommandError(

@@ -1,15 +1,12 @@
 """What a simulation leaves behind: the log of a run, its file, and its figures of merit."""
 
-import json
 import os
-import tempfile
-import zipfile
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
+from wfbook import archive
 from wfbook.go1_dynamics import GRAVITY
 from wfbook.modes import END_EFFECTORS, LEGS
 from wfbook.terrain import Terrain
@@ -86,24 +83,9 @@ class Run:
         Raises:
             OSError: the file can't be written.
         """
-        path = Path(path)
         arrays = {name: getattr(self, name) for name in self.LOGGED}
-        texts = {
-            "metrics": self.metrics,
-            "meta": self.meta | {"format": FORMAT},
-            "joint_names": self.joint_names,
-        }
-        arrays |= {name: np.array(json.dumps(value)) for name, value in texts.items()}
-        arrays["terrain"] = np.array(json.dumps(self.terrain.to_dict()))
-        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".npz", delete=False) as file:
-            try:
-                np.savez(file, **arrays)
-                file.close()
-                os.chmod(file.name, 0o644)
-                os.replace(file.name, path)
-            except BaseException:
-                os.unlink(file.name)
-                raise
+        texts = {name: getattr(self, name) for name in ("metrics", "meta", "joint_names")}
+        archive.save(path, arrays, texts | {"terrain": self.terrain.to_dict()}, FORMAT)
 
     @classmethod
     def load(cls, path: str | os.PathLike) -> Self:
@@ -113,21 +95,9 @@ class Run:
             ValueError: the file is no run, is truncated, or is of another version; the message names it.
             OSError: the file can't be read.
         """
-        try:
-            with np.load(path, allow_pickle=False) as file:
-                data = {name: file[name] for name in file.files}
-            texts = {
-                name: json.loads(str(data[name])) for name in ("metrics", "meta", "joint_names", "terrain")
-            }
-            arrays = {name: data[name] for name in cls.LOGGED}
-        except KeyError as error:
-            raise ValueError(f"{path}: not a run file: field {error} is missing") from error
-        except (zipfile.BadZipFile, EOFError, ValueError) as error:
-            raise ValueError(f"{path}: not a run file, or truncated ({error})") from error
-        if (version := texts["meta"].pop("format", None)) != FORMAT:
-            raise ValueError(f"{path}: meta: run format {version!r}, this program reads {FORMAT}")
-        texts["terrain"] = Terrain.from_dict(texts["terrain"], source=f"{path}: terrain")
-        return cls(**arrays, **texts)
+        data = archive.load(path, "run", cls.LOGGED, ("metrics", "meta", "joint_names", "terrain"), FORMAT)
+        data["terrain"] = Terrain.from_dict(data["terrain"], source=f"{path}: terrain")
+        return cls(**data)
 
 
 def metrics_of(

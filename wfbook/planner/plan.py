@@ -1,16 +1,12 @@
 """What the planner returns, and the file it is kept in."""
 
-import json
 import os
-import tempfile
-import zipfile
-import zlib
 from dataclasses import dataclass, fields, replace
-from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
 
+from wfbook import archive
 from wfbook.modes import END_EFFECTORS, LEGS, end_effector_types, lift_off_types
 from wfbook.terrain import Terrain
 
@@ -108,19 +104,8 @@ class Plan:
         Raises:
             OSError: the file can't be written.
         """
-        path = Path(path)
         arrays = {name: getattr(self, name) for name in _ARRAYS}
-        arrays["terrain"] = np.array(json.dumps(self.terrain.to_dict()))
-        arrays["meta"] = np.array(json.dumps(self.meta | {"format": FORMAT}))
-        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".npz", delete=False) as file:
-            try:
-                np.savez(file, **arrays)
-                file.close()
-                os.chmod(file.name, 0o644)
-                os.replace(file.name, path)
-            except BaseException:
-                os.unlink(file.name)
-                raise
+        archive.save(path, arrays, {"terrain": self.terrain.to_dict(), "meta": self.meta}, FORMAT)
 
     @classmethod
     def load(cls, path: str | os.PathLike) -> Self:
@@ -131,38 +116,9 @@ class Plan:
                 of a wrong shape or a number that is not finite. The message names file and field.
             OSError: the file can't be read.
         """
-        try:
-            with np.load(path, allow_pickle=False) as file:
-                data = {name: file[name] for name in file.files}
-        except FileNotFoundError:
-            raise
-        except (
-            zipfile.BadZipFile,
-            zlib.error,
-            EOFError,
-            OSError,
-            ValueError,
-            KeyError,
-            RuntimeError,
-        ) as error:
-            # A damaged archive shows itself in any of these ways.
-            raise ValueError(f"{path}: not a plan file, or truncated ({error})") from error
-        missing = [name for name in (*_ARRAYS, "terrain", "meta") if name not in data]
-        if missing:
-            raise ValueError(f"{path}: missing field {missing[0]!r}")
-        try:
-            meta = json.loads(str(data["meta"]))
-            terrain = json.loads(str(data["terrain"]))
-        except json.JSONDecodeError as error:
-            raise ValueError(f"{path}: terrain or meta is not JSON ({error})") from error
-        version = meta.pop("format", None) if isinstance(meta, dict) else None
-        if version != FORMAT:
-            raise ValueError(f"{path}: meta: plan format {version!r}, this program reads {FORMAT}")
-        plan = cls(
-            **{name: data[name] for name in _ARRAYS},
-            terrain=Terrain.from_dict(terrain, source=f"{path}: terrain"),
-            meta=meta,
-        )
+        data = archive.load(path, "plan", _ARRAYS, ("terrain", "meta"), FORMAT)
+        data["terrain"] = Terrain.from_dict(data["terrain"], source=f"{path}: terrain")
+        plan = cls(**data)
         plan._check(path)
         return plan
 
