@@ -66,7 +66,7 @@ def load(
     except FileNotFoundError:
         raise
     except _DAMAGE as error:
-        raise ValueError(f"{path}: not a {kind} file, or truncated ({error})") from error
+        raise ValueError(f"{path}: not a {kind} file, or truncated") from error
     for name in (*arrays, *texts):
         if name not in data:
             raise ValueError(f"{path}: not a {kind} file: missing field {name!r}")
