@@ -86,16 +86,17 @@ class Kernel:
             [self.conic.columns(v).ravel() for v in self.program.discrete.values()]
         )
         relaxed = relaxation.build(problem)
-        counts = cp.cumsum(relaxed.S, axis=1)
-        parts = [cp.vec(relaxed.S, order="C")]
-        if problem.wheels:
-            parts.append(cp.vec(relaxed.wheel, order="C"))
-        parts += [cp.vec(counts, order="C"), cp.sum(counts, axis=0)]
-        self._box = cp.Variable(self.layout.size)
         self._mirror = cp.Variable()
-        rows = [*relaxed.constraints, self._box == cp.hstack(parts), self._mirror == _mirror_row(relaxed.S)]
+        S, wheel, C = (cp.Variable(relaxed.S.shape) for _ in range(3))
+        T = cp.Variable(problem.slots)
+        rows = [*relaxed.constraints, S == relaxed.S, self._mirror == _mirror_row(S)]
+        rows += [C[:, 0] == S[:, 0], C[:, 1:] == C[:, :-1] + S[:, 1:], cp.sum(C, axis=0) == T]
+        box = [S, C, T]
+        if problem.wheels:
+            rows.append(wheel == relaxed.wheel)
+            box.insert(1, wheel)
         self._qp_conic = Conic.compile(relaxed.cost, rows)
-        self._columns = self._qp_conic.columns(self._box)
+        self._columns = np.concatenate([self._qp_conic.columns(v).ravel() for v in box])
         self._qp_discrete = np.concatenate(
             [self._qp_conic.columns(v).ravel() for v in relaxed.discrete.values()]
         )

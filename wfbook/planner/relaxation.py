@@ -89,10 +89,10 @@ def _forces(problem: Problem, a: list[Any], stance: dict, sizes: Any) -> tuple[A
     # The variable is what is squared, for CVXPY gives the square of anything else a variable of its own.
     squared = cp.Variable((K, sizes.shape[0]))
     parts = squared @ np.diag(np.sqrt(counts)) - 1 + chosen
-    along, across = cp.Variable(K), cp.Variable(K)
     rows = [parts >= 0, parts <= problem.limits.force * chosen @ np.diag(counts)]
     cost = weight * (cp.sum_squares(squared) - cp.sum((1 - chosen) @ np.diag(1.0 / counts)))
-    normal = cp.sum(parts, axis=1)
+    normal = 1.0 + a[2] / GRAVITY
+    rows.append(cp.sum(parts, axis=1) == normal)
     on_wheels = 0
     if problem.wheels:
         on_wheels = cp.Variable(K, nonneg=True)
@@ -100,11 +100,16 @@ def _forces(problem: Problem, a: list[Any], stance: dict, sizes: Any) -> tuple[A
     on_feet = normal - on_wheels
     rows.append(on_feet >= 0)
     rows.append(on_feet <= problem.limits.force * (spread @ cp.sum(stance["foot"], axis=0)))
+    # Newton's law leaves nothing free in the other two: what is not rolling friction is contact force.
+    along, across = a[0] / GRAVITY, a[1] / GRAVITY
+    cost += weight / L / GRAVITY**2 * cp.sum_squares(a[1])
+    if problem.wheels and region.rolling_resistance > 0:
+        along = along + region.rolling_resistance * on_wheels
+        cost += weight / L * cp.sum_squares(along)
+    else:
+        cost += weight / L / GRAVITY**2 * cp.sum_squares(a[0])
     rows += within(along, region.mu_foot * on_feet + region.mu_wheel * on_wheels)
     rows += within(across, region.mu_foot * on_feet + region.mu_wheel_lateral * on_wheels)
-    cost += weight / L * (cp.sum_squares(along) + cp.sum_squares(across))
-    push = (along - region.rolling_resistance * on_wheels, across, normal - 1.0)
-    rows += [a[i] == GRAVITY * push[i] for i in range(3)]
     return cost, rows
 
 
@@ -124,7 +129,8 @@ def _levers(
         place, step = cp.Variable((L, J + 1)), cp.Variable((L, J))
         rows += [place[:, 0] == problem.start_contacts[:, i], *within(step, limits.step[i] * S)]
         ends = x[i][0 : K + 1 : rho]
-        during = mean @ x[i][1:]
+        during = cp.Variable(J)
+        rows.append(during == mean @ x[i][1:])
         rolled = rolled_mean = slack = 0
         if problem.wheels and i == 0:
             low, high = -limits.speed[1], limits.speed[0]
@@ -156,10 +162,10 @@ def _levers(
         middle = lever_mean + (lever[:, :-1] - lever[:, 1:]) / (2 * rho)
         cost += 4 * w.bounds * rho * cp.sum_squares(middle)
 
-        vertex, parts = cp.Variable((L, J)), cp.Variable(sizes.shape)
+        vertex, away, parts = cp.Variable((L, J)), cp.Variable((L, J)), cp.Variable(sizes.shape)
         lower, upper = robot.reach_lower[:, [i]] @ ones, robot.reach_upper[:, [i]] @ ones
         rows += [vertex >= cp.multiply(lower, 1 - S), vertex <= cp.multiply(upper, 1 - S)]
-        away = lever_mean - vertex
+        rows.append(vertex + away == lever_mean)
         rows += [away >= cp.multiply(lower, S), away <= cp.multiply(upper, S)]
         edge = [centroid_bounds(problem, n, i) for n in range(sizes.shape[0])]
         rows += [
