@@ -45,8 +45,8 @@ class Worker:
 
 
 def available() -> bool:
-    """Tell whether there is a second core, and a system that can fork."""
-    return hasattr(os, "fork") and len(os.sched_getaffinity(0)) > 1
+    """Tell whether there is a second core, and a system (Linux) on which a process can be forked safely."""
+    return hasattr(os, "sched_getaffinity") and len(os.sched_getaffinity(0)) > 1
 
 
 def _serve(pipe: Connection, theirs: Connection, function: Callable[..., Any]) -> None:
