@@ -273,17 +273,22 @@ class Kernel:
         if key in self.excluded:
             return Solution("infeasible", np.inf, np.inf, np.zeros(0))
         if key not in self._leaves:
-            self.leaves += 1
-            self._leaves[key] = self._exact(S, wheel)
+            self._enter((S, wheel), self._exact(S, wheel))
         return self._leaves[key]
 
     def price(self, gaits: list[tuple[np.ndarray, np.ndarray]]) -> list[float]:
         """Return the exact costs of gaits; infinite where infeasible or excluded."""
         fresh = [g for g in gaits if gait_key(*g) not in self._leaves and gait_key(*g) not in self.excluded]
         for gait, found in zip(fresh, self._shared(self._exact, fresh), strict=True):
-            self._leaves[gait_key(*gait)] = found
-        self.leaves += len(fresh)
+            self._enter(gait, found)
         return [self.leaf(*gait).value for gait in gaits]
+
+    def _enter(self, gait: tuple[np.ndarray, np.ndarray], found: Solution) -> None:
+        """Remember a leaf; one without an answer keeps the proven bound below its own."""
+        self.leaves += 1
+        self._leaves[gait_key(*gait)] = found
+        if found.status == "failed":
+            self.pruned = min(self.pruned, self._gait_bound(*gait))
 
     def _exact(self, S: np.ndarray, wheel: np.ndarray) -> Solution:
         assigned = tight.assignment(self.problem, S, wheel)
