@@ -35,7 +35,7 @@ def all_gaits(kernel: Kernel):
             wheel = np.zeros((L, J), int)
             for (leg, j), kind in zip(swings, kinds, strict=True):
                 wheel[leg, j:] = kind
-            if kernel.admissible(S, wheel):
+            if kernel.boxes.admissible(S, wheel):
                 yield S, wheel
 
 
@@ -92,7 +92,7 @@ def test_an_assignment_feasible_in_one_formulation_is_feasible_in_the_other(end_
         relaxed.solve(solver=cp.CLARABEL)
         for variable in booleans:
             variable.attributes["boolean"] = True
-        feasible = kernel.admissible(S, wheel) and kernel.leaf(S, wheel).status == "solved"
+        feasible = kernel.boxes.admissible(S, wheel) and kernel.leaf(S, wheel).status == "solved"
         assert feasible == (relaxed.status == "optimal"), (S, wheel, relaxed.status)
         if feasible:
             assert relaxed.value == pytest.approx(kernel.leaf(S, wheel).value, rel=1e-5)
@@ -105,19 +105,19 @@ def test_the_relaxation_is_below_every_leaf_and_rises_as_boxes_shrink():
     p = problem(5, goal=(0.6, 0.05))
     kernel = Kernel(p)
     rng = np.random.default_rng(2)
-    root = kernel.root()
+    root = kernel.boxes.root()
     checked = 0
     while checked < 12:
         S, wheel = random_gait(rng, p)
-        leaf = kernel.leaf(S, wheel) if kernel.admissible(S, wheel) else None
+        leaf = kernel.leaf(S, wheel) if kernel.boxes.admissible(S, wheel) else None
         if leaf is None or leaf.status != "solved":
             continue
-        z = kernel.vector(S, wheel)
+        z = kernel.boxes.vector(S, wheel)
         low, high = (
             np.where(rng.random(z.size) < 0.3, z, root[0]),
             np.where(rng.random(z.size) < 0.3, z, root[1]),
         )
-        box = kernel.propagate(low, high)
+        box = kernel.boxes.propagate(low, high)
         assert box is not None
         assert (box[0] <= z).all() and (z <= box[1]).all(), "propagation lost a gait of the box"
         below, here = kernel.bound(*box), kernel.gait_bounds([(S, wheel)])[0]
@@ -130,7 +130,7 @@ def test_the_relaxation_is_below_every_leaf_and_rises_as_boxes_shrink():
 def test_a_presolved_leaf_has_the_value_of_the_program_itself():
     p = problem(3)
     program = tight.build(p)
-    S, wheel = next(g for g in list(templates(p))[::-1] if Kernel(p).admissible(*g))
+    S, wheel = next(g for g in list(templates(p))[::-1] if Kernel(p).boxes.admissible(*g))
     assigned = tight.assignment(p, S, wheel)
     conic = Conic.compile(program.cost, program.rows())
     columns = np.concatenate([conic.columns(v).ravel() for v in program.discrete.values()])

@@ -4,8 +4,10 @@ from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
-from wfbook.planner.kernel import MIRROR, Kernel, gait_key, mirror_symmetric
+from wfbook.planner.boxes import gait_key
+from wfbook.planner.kernel import Kernel
 from wfbook.planner.problem import Problem
+from wfbook.planner.symmetry import MIRROR, mirror_symmetric
 
 TROT = ((0, 3), (1, 2))
 CRAWL = ((2,), (0,), (3,), (1,))
@@ -115,7 +117,7 @@ def improve(
         fresh = []
         for gait in gaits:
             keys = {gait_key(*gait)} | ({gait_key(*mirrored(gait))} if symmetric else set())
-            if not (keys & seen) and kernel.admissible(*gait):
+            if not (keys & seen) and kernel.boxes.admissible(*gait):
                 seen.update(keys)
                 fresh.append(gait)
         bounds: list[float] = []

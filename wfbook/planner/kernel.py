@@ -1,8 +1,6 @@
-"""The search's own mathematics: what to branch on, what follows from it, how good a box can be.
+"""The search's own mathematics: how good a box of gaits can be, what a gait costs, where to split.
 
-The kernel knows no tree and no solver of trees. A *box* is a pair of integer vectors, lower and upper,
-over all branching variables: ``S[l, j]``, ``wheel[l, j]`` and two kinds of sums that cut far deeper
-than single binaries: ``C[l, j]``, the swings of leg ``l`` up to slot ``j``, and ``T[j] = Σ_l C[l, j]``.
+The kernel knows no tree and no solver of trees: SCIP drives it (:mod:`.tree`), and so can a test.
 """
 
 from collections.abc import Callable
@@ -14,10 +12,12 @@ import numpy as np
 from scipy import sparse
 
 from wfbook.planner import relaxation, tight
+from wfbook.planner.boxes import Boxes, gait_key
 from wfbook.planner.conic import Boxed, Conic, Solution
 from wfbook.planner.presolve import solve_fixed
 from wfbook.planner.problem import Problem
 from wfbook.planner.program import Program
+from wfbook.planner.symmetry import mirror_row, mirror_symmetric
 from wfbook.planner.worker import Worker, available
 
 INTEGRAL = 1e-5
@@ -28,40 +28,13 @@ _RELIABLE = 1  # after so many observations a pseudo-cost is believed
 
 
 @dataclass
-class Layout:
-    """Where the branching variables stand in a box's vectors.
-
-    Attributes:
-        S, wheel, C: index arrays of shape ``(L, J)``; ``wheel`` is empty without wheels.
-        T: ``(J,)`` index array.
-        size: length of the vectors.
-    """
-
-    S: np.ndarray
-    wheel: np.ndarray
-    C: np.ndarray
-    T: np.ndarray
-    size: int
-
-    @classmethod
-    def of(cls, problem: Problem) -> "Layout":
-        """Return the layout for a problem."""
-        L, J = problem.legs, problem.slots
-        n = L * J
-        S = np.arange(n).reshape(L, J)
-        wheel = n + S if problem.wheels else np.zeros((0, J), int)
-        start = 2 * n if problem.wheels else n
-        return cls(S, wheel, start + S, start + n + np.arange(J), start + n + J)
-
-
-@dataclass
 class Kernel:
     """Bounds, leaves and branching for one problem.
 
     Attributes:
         problem: what is asked.
         program: the tight formulation, whose value at fixed binaries is the truth.
-        layout: of boxes.
+        boxes: of gaits.
         excluded: gaits that are not to be found (they could not be polished).
         qps: relaxations solved so far.
         leaves: exact programs solved so far.
@@ -71,7 +44,7 @@ class Kernel:
 
     problem: Problem
     program: Program = field(init=False)
-    layout: Layout = field(init=False)
+    boxes: Boxes = field(init=False)
     excluded: set[bytes] = field(default_factory=set)
     qps: int = 0
     leaves: int = 0
@@ -79,7 +52,7 @@ class Kernel:
 
     def __post_init__(self):
         problem = self.problem
-        self.layout = Layout.of(problem)
+        self.boxes = Boxes(problem)
         self.program = tight.build(problem)
         self.conic = Conic.compile(self.program.cost, self.program.rows())
         self._discrete = np.concatenate(
@@ -89,7 +62,7 @@ class Kernel:
         self._mirror = cp.Variable()
         S, wheel, C = (cp.Variable(relaxed.S.shape) for _ in range(3))
         T = cp.Variable(problem.slots)
-        rows = [*relaxed.constraints, S == relaxed.S, self._mirror == _mirror_row(S)]
+        rows = [*relaxed.constraints, S == relaxed.S, self._mirror == mirror_row(S)]
         rows += [C[:, 0] == S[:, 0], C[:, 1:] == C[:, :-1] + S[:, 1:], cp.sum(C, axis=0) == T]
         box = [S, C, T]
         if problem.wheels:
@@ -105,10 +78,9 @@ class Kernel:
         self._bounds: dict[bytes, Solution] = {}
         self._leaves: dict[bytes, Solution] = {}
         # Sum of relative gains, and how many were seen, for each variable down and up.
-        self._gain = np.zeros((2, self.layout.size))
-        self._seen = np.zeros((2, self.layout.size))
+        self._gain = np.zeros((2, self.boxes.layout.size))
+        self._seen = np.zeros((2, self.boxes.layout.size))
         self._worker: Worker | None = None
-        self._members = np.array([[leg in p for p in problem.patterns] for leg in range(problem.legs)])
 
     def _symmetry_broken(self) -> Conic:
         """Return the QP with one of each pair of mirror images cut off, where the problem has them."""
@@ -118,91 +90,6 @@ class Kernel:
         n = conic.A.shape[1]
         row = sparse.csc_matrix(([-1.0], ([0], [int(conic.columns(self._mirror))])), shape=(1, n))
         return conic.with_rows(sparse.csc_matrix((0, n)), np.zeros(0), row, np.zeros(1))
-
-    def root(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Return the box of everything that is possible, propagated; None if nothing is."""
-        J, L, layout = self.problem.slots, self.problem.legs, self.layout
-        lower, upper = np.zeros(layout.size, int), np.ones(layout.size, int)
-        upper[layout.C] = np.arange(1, J + 1)
-        upper[layout.T] = L * np.arange(1, J + 1)
-        if self.problem.final_stance:
-            upper[layout.S[:, -1]] = 0
-        return self.propagate(lower, upper)
-
-    def propagate(self, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """Tighten a box by what S, C, T, the patterns and the wheels imply of each other.
-
-        Returns:
-            The tightened box, or None if it is empty.
-        """
-        lower, upper = lower.copy(), upper.copy()
-        layout = self.layout
-        while True:
-            before = lower.sum(), upper.sum()
-            S_low, S_up = lower[layout.S], upper[layout.S]
-            if not self._patterns(S_low, S_up):
-                return None
-            if self.problem.stance_between_swings:
-                S_up[:, 1:] &= 1 - S_low[:, :-1]
-                S_up[:, :-1] &= 1 - S_low[:, 1:]
-            C_low, C_up = lower[layout.C], upper[layout.C]
-            T_low, T_up = lower[layout.T], upper[layout.T]
-            _narrow_sums(S_low, S_up, C_low, C_up)
-            np.maximum(T_low, C_low.sum(axis=0), out=T_low)
-            np.minimum(T_up, C_up.sum(axis=0), out=T_up)
-            np.maximum(C_low, T_low - (C_up.sum(axis=0) - C_up), out=C_low)
-            np.minimum(C_up, T_up - (C_low.sum(axis=0) - C_low), out=C_up)
-            if self.problem.wheels and not self._wheels(lower, upper, S_low, S_up):
-                return None
-            lower[layout.S], upper[layout.S] = S_low, S_up
-            lower[layout.C], upper[layout.C] = C_low, C_up
-            lower[layout.T], upper[layout.T] = T_low, T_up
-            if (lower > upper).any():
-                return None
-            if (lower.sum(), upper.sum()) == before:
-                return lower, upper
-
-    def _patterns(self, S_low: np.ndarray, S_up: np.ndarray) -> bool:
-        """Keep each slot's legs within the admissible patterns; False if none fits."""
-        members = self._members[:, None, :]
-        fits = ((members >= S_low[..., None]) & (members <= S_up[..., None])).all(axis=0)
-        if not fits.any(axis=1).all():
-            return False
-        S_low |= (members | ~fits).all(axis=2)
-        S_up &= (members & fits).any(axis=2)
-        return True
-
-    def _wheels(self, lower: np.ndarray, upper: np.ndarray, S_low: np.ndarray, S_up: np.ndarray) -> bool:
-        """Propagate eq. 16: without a swing a leg keeps its end effector."""
-        layout = self.layout
-        start = np.array([[int(e == "wheel")] for e in self.problem.start_end_effectors])
-        low = np.hstack([start, lower[layout.wheel]])
-        up = np.hstack([start, upper[layout.wheel]])
-        for j in range(self.problem.slots):
-            keeps = S_up[:, j] == 0
-            for at, other in ((j + 1, j), (j, j + 1)):
-                low[keeps, at] = np.maximum(low[keeps, at], low[keeps, other])
-                up[keeps, at] = np.minimum(up[keeps, at], up[keeps, other])
-            changes = (low[:, j] > up[:, j + 1]) | (up[:, j] < low[:, j + 1])
-            S_low[changes, j] = 1
-        if (low > up).any() or (self.problem.final_stance and low[:, -1].all()):
-            return False
-        lower[layout.wheel], upper[layout.wheel] = low[:, 1:], up[:, 1:]
-        return True
-
-    def bound(self, lower: np.ndarray, upper: np.ndarray, cutoff: float = np.inf) -> Solution:
-        """Solve the QP relaxation over a box; remembered, for children are bounded before they are made.
-
-        Args:
-            lower: the box's lower vector.
-            upper: its upper vector.
-            cutoff: stop as soon as the bound is known to be higher.
-        """
-        found = self._known(lower, upper, cutoff)
-        if found is None:
-            self.qps += 1
-            found = self._bounds[_key(lower, upper)] = self._solve(lower, upper, cutoff)
-        return found
 
     def open(self) -> None:
         """Start the worker process, if there is a second core for it; results are the same without."""
@@ -252,20 +139,19 @@ class Kernel:
         """Return the branching variables' values in a relaxation's solution."""
         return solution.y
 
-    def gait(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return swing matrix and wheel's dynamics matrix, ``(L, J)`` integers, of a vector."""
-        S = np.rint(z[self.layout.S]).astype(int)
-        return S, np.rint(z[self.layout.wheel]).astype(int) if self.problem.wheels else np.zeros_like(S)
+    def bound(self, lower: np.ndarray, upper: np.ndarray, cutoff: float = np.inf) -> Solution:
+        """Solve the QP relaxation over a box; remembered, for children are bounded before they are made.
 
-    def vector(self, S: np.ndarray, wheel: np.ndarray) -> np.ndarray:
-        """Return the branching variables' values for a gait."""
-        z = np.zeros(self.layout.size, int)
-        z[self.layout.S] = S
-        if self.problem.wheels:
-            z[self.layout.wheel] = wheel
-        z[self.layout.C] = np.cumsum(S, axis=1)
-        z[self.layout.T] = np.cumsum(S.sum(axis=0))
-        return z
+        Args:
+            lower: the box's lower vector.
+            upper: its upper vector.
+            cutoff: stop as soon as the bound is known to be higher.
+        """
+        found = self._known(lower, upper, cutoff)
+        if found is None:
+            self.qps += 1
+            found = self._bounds[_key(lower, upper)] = self._solve(lower, upper, cutoff)
+        return found
 
     def leaf(self, S: np.ndarray, wheel: np.ndarray) -> Solution:
         """Solve the exact program at fixed binaries; infeasible if the gait is excluded."""
@@ -312,16 +198,6 @@ class Kernel:
         fixed = np.concatenate([assigned[k].ravel() for k in self._qp_keys])
         return solve_fixed(self._qp_conic, self._qp_discrete, fixed).bound
 
-    def admissible(self, S: np.ndarray, wheel: np.ndarray) -> bool:
-        """Tell whether a gait satisfies all that concerns integers alone."""
-        root = self.root()
-        z = self.vector(S, wheel)
-        return (
-            root is not None
-            and bool((root[0] <= z).all() and (z <= root[1]).all())
-            and self.propagate(z, z) is not None
-        )
-
     def split(
         self, lower: np.ndarray, upper: np.ndarray, solution: Solution, cutoff: float
     ) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -342,7 +218,7 @@ class Kernel:
         fractional = open_[fraction > INTEGRAL]
         candidates = fractional if len(fractional) else open_
         # What a leg carries in the end decides more than what it carries on the way.
-        on_the_way = np.isin(candidates, self.layout.wheel[:, :-1])
+        on_the_way = np.isin(candidates, self.boxes.layout.wheel[:, :-1])
         if not on_the_way.all():
             candidates = candidates[~on_the_way]
         score = self._score(candidates, z)
@@ -385,7 +261,7 @@ class Kernel:
         floor = min(max(floor, lower[index]), upper[index] - 1)
         below, above = upper.copy(), lower.copy()
         below[index], above[index] = floor, floor + 1
-        return [self.propagate(lower, below), self.propagate(above, upper)]
+        return [self.boxes.propagate(lower, below), self.boxes.propagate(above, upper)]
 
     def _observe(self, child, index: int, side: int, solution: Solution, cutoff: float) -> float:
         """Bound a child and learn from it; infinite where nothing of interest is left."""
@@ -406,63 +282,6 @@ class Kernel:
         return gain
 
 
-def _narrow_sums(S_low: np.ndarray, S_up: np.ndarray, C_low: np.ndarray, C_up: np.ndarray) -> None:
-    """Propagate ``C[:, j] = C[:, j−1] + S[:, j]`` forward, backward and into S, in place."""
-    J = S_low.shape[1]
-    zero = np.zeros(len(S_low), int)
-    for j in range(J):
-        low, up = (C_low[:, j - 1], C_up[:, j - 1]) if j else (zero, zero)
-        np.maximum(C_low[:, j], low + S_low[:, j], out=C_low[:, j])
-        np.minimum(C_up[:, j], up + S_up[:, j], out=C_up[:, j])
-    for j in range(J - 1, -1, -1):
-        low, up = (C_low[:, j - 1], C_up[:, j - 1]) if j else (zero, zero)
-        np.maximum(S_low[:, j], C_low[:, j] - up, out=S_low[:, j])
-        np.minimum(S_up[:, j], C_up[:, j] - low, out=S_up[:, j])
-        if j:
-            np.maximum(C_low[:, j - 1], C_low[:, j] - S_up[:, j], out=C_low[:, j - 1])
-            np.minimum(C_up[:, j - 1], C_up[:, j] - S_low[:, j], out=C_up[:, j - 1])
-
-
 def _key(lower: np.ndarray, upper: np.ndarray) -> bytes:
     """Return a key for a box."""
     return np.concatenate([lower, upper]).astype(np.int16).tobytes()
-
-
-def gait_key(S: np.ndarray, wheel: np.ndarray) -> bytes:
-    """Return a key for a gait."""
-    return np.concatenate([np.ravel(S), np.ravel(wheel)]).astype(np.int8).tobytes()
-
-
-MIRROR = (1, 0, 3, 2)
-"""The leg on the other side: FL and FR, RL and RR."""
-
-
-def mirror_symmetric(problem: Problem) -> bool:
-    """Tell whether mirroring left and right leaves a problem as it is.
-
-    Then every plan has a mirror image of the same cost, and one of the two is enough.
-    """
-    axis, tolerance = problem.start[1], 1e-9
-    mirrored = np.asarray(problem.start_contacts)[list(MIRROR)]
-    contacts = np.abs(mirrored[:, 0] - problem.start_contacts[:, 0]).max() < tolerance
-    contacts &= np.abs(2 * axis - mirrored[:, 1] - problem.start_contacts[:, 1]).max() < tolerance
-    kinds = list(problem.start_end_effectors)
-    A, b = problem.region.halfspaces
-    sides = {(round(r[0], 9), round(r[1], 9), round(c, 9)) for r, c in zip(A, b, strict=True)}
-    images = {
-        (round(r[0], 9), round(-r[1], 9), round(c - 2 * axis * r[1], 9)) for r, c in zip(A, b, strict=True)
-    }
-    patterns = {frozenset(p) for p in problem.patterns}
-    return bool(
-        contacts
-        and abs(problem.goal[1] - axis) < tolerance
-        and kinds == [kinds[m] for m in MIRROR]
-        and sides == images
-        and patterns == {frozenset(MIRROR[leg] for leg in p) for p in patterns}
-    )
-
-
-def _mirror_row(S: cp.Expression) -> cp.Expression:
-    """Return a function of the gait that changes sign when it is mirrored."""
-    falling = 0.5 ** np.arange(S.shape[1])
-    return (S[0] - S[1]) @ falling + 0.5 * (S[2] - S[3]) @ falling

@@ -7,9 +7,10 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from wfbook.planner import bigm
+from wfbook.planner.boxes import gait_key
 from wfbook.planner.explain import InfeasibleError, NoPlanError, conflicting_groups
 from wfbook.planner.extract import fill, plan_of, read
-from wfbook.planner.kernel import Kernel, gait_key
+from wfbook.planner.kernel import Kernel
 from wfbook.planner.plan import Plan
 from wfbook.planner.polish import Polisher, repaired
 from wfbook.planner.problem import Problem

@@ -83,7 +83,7 @@ class Tree:
         Returns:
             Status ("optimal", "infeasible", "time limit" or "interrupted"), proven bound, node count.
         """
-        root = self.kernel.root()
+        root = self.kernel.boxes.root()
         if root is None or self.kernel.bound(*root).status == "infeasible":
             return "infeasible", np.inf, 0
         self.root_bound = self.kernel.bound(*root).bound
@@ -175,7 +175,7 @@ class Tree:
         """Hand the incumbent to SCIP."""
         value, S, wheel = self.best
         solution = self.model.createSol(heuristic)
-        for variable, number in zip(self.variables, self.kernel.vector(S, wheel), strict=True):
+        for variable, number in zip(self.variables, self.kernel.boxes.vector(S, wheel), strict=True):
             self.model.setSolVal(solution, variable, float(number))
         self.model.setSolVal(solution, self.cost, value)
         return self.model.trySol(solution, printreason=False, checkbounds=False)
@@ -220,7 +220,7 @@ class _Bound(Relax):
     def _bound(self) -> dict[str, Any]:
         tree = self.tree
         tree.report()
-        box = tree.kernel.propagate(*tree.box())
+        box = tree.kernel.boxes.propagate(*tree.box())
         if box is None:
             return {"result": SCIP_RESULT.CUTOFF}
         found = tree.kernel.bound(*box, tree.cutoff)
@@ -246,20 +246,20 @@ class _Split(Branchrule):
 
     def _split(self) -> dict[str, Any]:
         tree, kernel = self.tree, self.tree.kernel
-        box = kernel.propagate(*tree.box())
+        box = kernel.boxes.propagate(*tree.box())
         if box is None:
             return {"result": SCIP_RESULT.CUTOFF}
         found = kernel.bound(*box)
         if found.status == "solved":
             z = kernel.values(found)
-            binaries = z[np.concatenate([kernel.layout.S.ravel(), kernel.layout.wheel.ravel()])]
+            binaries = z[np.concatenate([kernel.boxes.layout.S.ravel(), kernel.boxes.layout.wheel.ravel()])]
             if np.abs(binaries - np.rint(binaries)).max() <= INTEGRAL:
                 before = tree.incumbent
-                tree.price(*kernel.gait(z))
+                tree.price(*kernel.boxes.gait(z))
                 if tree.incumbent < before:
                     tree.submit()
         if (box[0] == box[1]).all():
-            tree.price(*kernel.gait(box[0]))
+            tree.price(*kernel.boxes.gait(box[0]))
             return {"result": SCIP_RESULT.CUTOFF}
         children = kernel.split(*box, found, tree.cutoff)
         if not children:
@@ -293,10 +293,12 @@ class _Price(Conshdlr):
     def _check(self, solution: Any) -> dict[str, Any]:
         tree = self.tree
         z = np.array([tree.model.getSolVal(solution, v) for v in tree.variables])
-        if np.abs(z - np.rint(z)).max() > INTEGRAL or not tree.kernel.admissible(*tree.kernel.gait(z)):
+        if np.abs(z - np.rint(z)).max() > INTEGRAL or not tree.kernel.boxes.admissible(
+            *tree.kernel.boxes.gait(z)
+        ):
             return {"result": SCIP_RESULT.INFEASIBLE}
         cost = tree.model.getSolVal(solution, tree.cost)
-        right = cost >= tree.kernel.leaf(*tree.kernel.gait(z)).value - 1e-9
+        right = cost >= tree.kernel.leaf(*tree.kernel.boxes.gait(z)).value - 1e-9
         return {"result": SCIP_RESULT.FEASIBLE if right else SCIP_RESULT.INFEASIBLE}
 
     def consenfolp(self, constraints, n_useful, infeasible) -> dict[str, Any]:
@@ -313,8 +315,8 @@ class _Price(Conshdlr):
         if (lower < upper).any():
             return {"result": SCIP_RESULT.INFEASIBLE}
         before = tree.incumbent
-        if tree.kernel.admissible(*tree.kernel.gait(lower)):
-            tree.price(*tree.kernel.gait(lower))
+        if tree.kernel.boxes.admissible(*tree.kernel.boxes.gait(lower)):
+            tree.price(*tree.kernel.boxes.gait(lower))
         if tree.incumbent < before:
             tree.submit()
         return {"result": SCIP_RESULT.CUTOFF}
