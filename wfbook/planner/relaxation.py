@@ -174,14 +174,14 @@ def _levers(
         ]
         rows.append(cp.sum(vertex, axis=0) == counts @ parts)
         cost += w.centroid * rho * cp.sum_squares(cp.sum(parts, axis=0))
-        # Within a slot whose standing legs are all feet, levers vary as the centre of mass does.
+        # Within a slot whose standing legs are all feet, c − x varies as the centre of mass does.
         varied = x[i][1:] - grid.spread @ during
         if problem.wheels:
             most = 0.5 * (rho - 1) * problem.dt * max(*limits.speed, limits.lateral_speed)
             rolling = grid.spread @ cp.sum(stance["wheel"], axis=0)
             about, varied = varied, cp.Variable(K, nonneg=True)
             rows += [varied >= side - most * rolling for side in (about, -about)]
-        cost += (w.centroid + 4 * w.bounds * counts.min()) * cp.sum_squares(varied)
+        cost += w.centroid * cp.sum_squares(varied)
     return cost, rows
 
 
