@@ -112,7 +112,6 @@ WRONG = {
     "no time": (["run", "flat", "--time-limit", "0"], "--time-limit: must be above 0"),
     "negative delay": (["run", "flat", "--delay-ms", "-1"], "--delay-ms: must be at least 0"),
     "negative seed": (["run", "flat", "--seed", "-1"], "--seed: must be at least 0"),
-    "estimator": (["run", "flat", "--state", "estimated"], "no state estimator yet"),
     "unknown state": (["run", "flat", "--state", "guessed"], "'guessed'"),
     "missing plan file": (["run", "--plan", "gone.npz"], "'gone.npz': No such file"),
     "plan and slots": (["run", "--plan", "gone.npz", "--slots", "3"], "--slots has no effect with --plan"),

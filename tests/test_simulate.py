@@ -147,8 +147,8 @@ def test_a_run_survives_its_file(tmp_path, trot):
 
 def test_wrong_arguments_are_named():
     plan = handmade.stand(1)
-    with pytest.raises(ValueError, match="estimator"):
-        run(plan, state="estimated")
+    with pytest.raises(ValueError, match="wheel_model"):
+        run(plan, state="estimated", wheel_model="guess")
     with pytest.raises(ValueError, match="state"):
         run(plan, state="guessed")
     for wrong in ({"delay": -0.001}, {"hold": float("nan")}):

@@ -18,6 +18,8 @@ _CHAPTERS = (
     "planner",
     "go1",
     "wbc",
+    "sensors",
+    "estimator",
     "simulate",
     "view",
 )

@@ -170,10 +170,6 @@ def _number(least: float, above: bool = False) -> Callable[[str], float]:
 
 def _run(arguments: argparse.Namespace) -> int:
     """Plan (or load a plan), execute, write the results and tell what happened."""
-    if arguments.state == "estimated":
-        raise CommandError(
-            "--state estimated: there is no state estimator yet, use --state true", WRONG_INPUT
-        )
     plan = problem = None
     if arguments.plan is not None:
         plan = _given_plan(arguments)

@@ -23,9 +23,14 @@ WHEEL_HALF_WIDTH = 0.012
 RADII = np.array([FOOT_RADIUS, WHEEL_RADIUS])
 """Height of the leg's end above its contact point, by end effector (0 foot, 1 wheel)."""
 
+IMU_POSITION = np.array([-0.01592, -0.06659, -0.00617])
+"""Of the inertial measurement unit, in the trunk's frame; it is not turned."""
+
 _LINK = 0.213
 _HIP = np.array([0.1881, 0.04675, 0.0])
 _ABDUCTION = 0.08
+_SIDES = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [-1.0, 1.0, 1.0], [-1.0, -1.0, 1.0]])
+_YZX, _ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])
 _THICKNESS = 0.5
 _LOADED = 1.0
 
@@ -66,6 +71,31 @@ def leg_angles(leg: int, end_b: np.ndarray) -> np.ndarray:
     hip = (hip + np.pi) % (2 * np.pi) - np.pi
     calf = -2 * np.arccos(reach / (2 * _LINK))
     return np.array([hip, np.arctan2(-x, depth) - calf / 2, calf])
+
+
+def leg_kinematics(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return where the legs' ends are in the trunk's frame, and how they and the calves move.
+
+    Args:
+        angles: ``(4, 3)`` hip, thigh and calf of each leg.
+
+    Returns:
+        ``(4, 3)`` ends (centres of foot and wheel), ``(4, 3, 3)`` their Jacobians, and ``(4, 3, 3)`` the
+        Jacobians of the calves' angular velocities, whose last columns are the wheels' axles.
+    """
+    cos, sin = np.cos(angles[:, 0]), np.sin(angles[:, 0])
+    slopes = np.stack([angles[:, 1], angles[:, 1] + angles[:, 2]])
+    x, depth = -_LINK * np.sin(slopes), -_LINK * np.cos(slopes)  # of thigh and calf, before the hip turns
+    links = np.stack([x, -sin * depth, cos * depth], axis=2)
+    axles = np.stack([0.0 * cos, cos, sin], axis=1)
+    from_knee, from_thigh = links[1], links[0] + links[1]
+    from_hip = from_thigh + _ABDUCTION * _SIDES[:, 1:2] * axles
+    turning, levers = np.zeros((4, 3, 3)), np.empty((4, 3, 3))
+    turning[:, 0, 0] = 1.0
+    turning[:, :, 1] = turning[:, :, 2] = axles
+    levers[:, :, 0], levers[:, :, 1], levers[:, :, 2] = from_hip, from_thigh, from_knee
+    jacobian = turning[:, _YZX] * levers[:, _ZXY] - turning[:, _ZXY] * levers[:, _YZX]
+    return _HIP * _SIDES + from_hip, jacobian, turning
 
 
 class Go1:

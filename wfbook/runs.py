@@ -15,7 +15,7 @@ from wfbook.tracking import Swing
 if TYPE_CHECKING:
     from wfbook.planner.plan import Plan
 
-FORMAT = 1
+FORMAT = 2
 """Version of the run file; a file of another version is refused."""
 
 
@@ -43,7 +43,11 @@ class Run:
         com_ref: ``(N, 3)`` planned centre of mass.
         com_velocity_ref: ``(N, 3)``.
         p_ref: ``(N, 4, 3)`` where the lowest points were to be.
-        tick_ms: ``(N,)`` computing time of each tick, in milliseconds.
+        base_estimate: ``(N, 7)`` estimate of ``qpos[:, :7]``; the truth if the controller saw it.
+        base_velocity_estimate: ``(N, 6)`` estimate of ``qvel[:, :6]``.
+        com_estimate: ``(N, 3)`` estimate of ``com``.
+        tick_ms: ``(N,)`` computing time of each tick, in milliseconds, without the estimator.
+        estimator_ms: ``(N,)`` of the estimator.
         metrics: figures of merit, see :func:`metrics_of`.
         meta: how it was run.
         terrain: on what.
@@ -53,6 +57,7 @@ class Run:
     LOGGED: ClassVar[tuple[str, ...]] = (
         *("t", "qpos", "qvel", "tau", "tau_command", "com", "com_velocity", "rpy", "p", "contact_force"),
         *("in_contact", "end_effector", "stance", "com_ref", "com_velocity_ref", "p_ref", "tick_ms"),
+        *("base_estimate", "base_velocity_estimate", "com_estimate", "estimator_ms"),
     )
 
     t: np.ndarray
@@ -72,6 +77,10 @@ class Run:
     com_velocity_ref: np.ndarray
     p_ref: np.ndarray
     tick_ms: np.ndarray
+    base_estimate: np.ndarray
+    base_velocity_estimate: np.ndarray
+    com_estimate: np.ndarray
+    estimator_ms: np.ndarray
     metrics: dict[str, Any]
     meta: dict[str, Any]
     terrain: Terrain
@@ -160,8 +169,7 @@ def metrics_of(
         "base_rms_rad": tilt,
         "base_rms_xyz_m": np.sqrt(np.mean(error**2, axis=0)).tolist() if going.any() else None,
         "base_rms_rpy_rad": np.sqrt(np.mean(angles**2, axis=0)).tolist() if going.any() else None,
-        "estimate_drift_percent": None,
-        "estimate_velocity_rms_m_s": None,
+        **_estimation(log, distance, meta),
         "slip_max_m": slip,
         "tick_ms_median": float(np.median(log["tick_ms"])),
         "tick_ms_p99": float(np.percentile(log["tick_ms"], 99)),
@@ -171,6 +179,23 @@ def metrics_of(
         "fell": fell,
         "fall_time_s": fall_time,
     }
+
+
+def _estimation(log: dict[str, np.ndarray], distance: float, meta: dict[str, Any]) -> dict[str, Any]:
+    """Return how good the estimate was from the plan's start on; None if there was none.
+
+    The drift is by how much the estimated displacement of the trunk differs from the true one, in per cent
+    of the distance travelled.
+    """
+    names = ("estimate_drift_percent", "estimate_velocity_rms_m_s", "estimator_ms_median")
+    going = log["t"] >= 0.0
+    if meta["state"] == "true" or not going.any():
+        return dict.fromkeys(names)
+    error = (log["base_estimate"][:, :3] - log["qpos"][:, :3])[going]
+    slow = (log["base_velocity_estimate"][:, :3] - log["qvel"][:, :3])[going]
+    drift = 100.0 * float(np.linalg.norm(error[-1] - error[0])) / distance if distance > 0.01 else None
+    speed_error = float(np.sqrt(np.mean(np.sum(slow**2, axis=1))))
+    return dict(zip(names, (drift, speed_error, float(np.median(log["estimator_ms"]))), strict=True))
 
 
 def _lift_off(

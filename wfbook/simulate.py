@@ -12,11 +12,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from wfbook.estimator import TOUCH, Estimator
 from wfbook.go1 import Go1
-from wfbook.go1_dynamics import MOTORS, Go1Dynamics
-from wfbook.modes import END_EFFECTORS
+from wfbook.go1_dynamics import MOTORS, WHEELS, Go1Dynamics
+from wfbook.modes import END_EFFECTORS, LEGS
 from wfbook.reference import Gains, Ground, Reference
 from wfbook.runs import Run, metrics_of
+from wfbook.sensors import Sensors
 from wfbook.tracking import Tracker
 from wfbook.wbc import WholeBodyController, contacts, weight_share
 
@@ -29,7 +31,6 @@ SETTLE = 0.5
 """Time in which the robot comes to rest in the plan's first posture."""
 
 _CONTROL_STEPS = 2
-_FEELS = 3.0
 _FALLEN_TILT = np.cos(np.radians(60.0))
 
 
@@ -44,6 +45,7 @@ def run(
     joint_friction: float = 0.0,
     trunk_mass_scale: float = 1.0,
     gains: Gains | None = None,
+    wheel_model: str = "encoder",
 ) -> Run:
     """Execute a plan: settle in its first posture, follow it, stand still at its end.
 
@@ -52,28 +54,31 @@ def run(
     Args:
         plan: what to do; a polished one if it is to succeed.
         delay: after which a torque acts, a whole number of milliseconds.
-        state: what the controller knows: ``"true"``, MuJoCo's state.
+        state: what the controller knows: ``"true"``, MuJoCo's state, or ``"estimated"``, what noisy sensors
+            and :mod:`wfbook.estimator` make of it.
         hold: time to stand at the end.
-        seed: of the small random error in the start posture (2 mrad in each joint).
+        seed: of the small random error in the start posture (2 mrad in each joint) and of the sensors.
         progress: called with simulated and total time, ten times a simulated second.
         push: force ``(3,)`` on the trunk in the world, its start after the plan's, and its duration.
         joint_friction: dry friction in the simulated joints, N m, which the controller does not know.
         trunk_mass_scale: of the simulated trunk, likewise.
         gains: of the controller.
+        wheel_model: of the estimator, one of :data:`wfbook.estimator.WHEEL_MODELS`.
 
     Raises:
         ValueError: an argument is out of range, or the plan's first posture is out of reach.
     """
-    if state == "estimated":
-        raise ValueError(
-            "state: 'estimated' needs the state estimator, which this version does not have; use 'true'"
-        )
-    if state != "true":
+    if state not in ("true", "estimated"):
         raise ValueError(f"state: {state!r} is neither 'true' nor 'estimated'")
     for name, value in (("delay", delay), ("hold", hold)):
         if not 0.0 <= value < 100.0:
             raise ValueError(f"{name}: {value!r} is not between 0 and 100 s")
-    return _Execution(plan, delay, seed, push, joint_friction, trunk_mass_scale, gains).run(hold, progress)
+    estimator = Estimator(wheel_model)
+    if state == "true":
+        estimator = None
+    return _Execution(plan, delay, seed, push, joint_friction, trunk_mass_scale, gains, estimator).run(
+        hold, progress
+    )
 
 
 class _Execution:
@@ -88,10 +93,12 @@ class _Execution:
         joint_friction: float,
         trunk_mass_scale: float,
         gains: Gains | None,
+        estimator: Estimator | None,
     ) -> None:
         self.plan, self.delay, self.push = plan, delay, push
         self.robot = Go1(plan.terrain, joint_friction, trunk_mass_scale)
         self.dynamics = Go1Dynamics()
+        self.truth = self.dynamics if estimator is None else Go1Dynamics()
         self.controller = WholeBodyController(self.dynamics, gains)
         self.tracker = Tracker(plan, delay)
         self.step_time = float(self.robot.model.opt.timestep)
@@ -99,6 +106,11 @@ class _Execution:
         qpos = self.dynamics.posture(plan.x[0], np.zeros(3), self.tracker.start_ends())
         qpos[1 + MOTORS] += 0.002 * np.random.default_rng(seed).standard_normal(12)
         self.robot.reset(qpos, kinds)
+        self.estimator, self.sensors = estimator, Sensors(seed)
+        if estimator is not None:
+            self.truth.update(qpos, np.zeros(22))
+            estimator.start(qpos[:3], self.sensors.tilted(self.truth.R_wb))
+        self.normals = self.tracker.start_normals()
         self.log: dict[str, list] = {name: [] for name in Run.LOGGED}
         self.work = np.zeros(2)
         self.asked = np.zeros((4, 3))
@@ -106,6 +118,8 @@ class _Execution:
         self.meta = {
             "delay": delay,
             "seed": seed,
+            "state": "true" if estimator is None else "estimated",
+            "wheel_model": None if estimator is None else estimator.wheel_model,
             "settle": SETTLE,
             "joint_friction": joint_friction,
             "trunk_mass_scale": trunk_mass_scale,
@@ -161,19 +175,24 @@ class _Execution:
 
     def _tick(self, t: float) -> np.ndarray:
         """Run the controller once, log, and return the torques it commands."""
-        robot, dynamics, tracker = self.robot, self.dynamics, self.tracker
+        robot, dynamics, tracker, truth = self.robot, self.dynamics, self.tracker, self.truth
         forces = robot.contact_forces()
+        loads = np.linalg.norm(forces, axis=1)
+        touching = loads > TOUCH
+        qpos, qvel, estimator_time = self._known(touching)
+        if truth is not dynamics:
+            truth.update(robot.data.qpos, robot.data.qvel)
         began = time.perf_counter()
-        dynamics.update(robot.data.qpos, robot.data.qvel)
-        touching = np.linalg.norm(forces, axis=1) > _FEELS
+        dynamics.update(qpos, qvel)
         ref, ground = tracker.update(t, dynamics, touching, self.asked)
         for leg, kind in tracker.switches(t, dynamics.centres, robot.end_effectors):
-            robot.set_end_effector(leg, kind)
+            if loads[LEGS.index(leg)] < TOUCH / 3:
+                robot.set_end_effector(leg, kind)
         present = robot.end_effectors.astype(bool)
         share = weight_share(dynamics, ref.com_acceleration, ref.stance)
         ref = replace(ref, wheels=present, forces=share)
         command = self.controller.tick(ref, ground)
-        self.asked = command.forces
+        self.asked, self.normals = command.forces, ground.normals
         elapsed = time.perf_counter() - began
         self._slip(ground, ref, forces)
         sample = {
@@ -181,28 +200,48 @@ class _Execution:
             "qpos": robot.data.qpos.copy(),
             "qvel": robot.data.qvel.copy(),
             "tau_command": command.torques,
-            "com": dynamics.com,
-            "com_velocity": dynamics.com_velocity,
-            "rpy": roll_pitch_yaw(dynamics.R_wb),
-            "p": dynamics.centres + dynamics.contact_offsets(ground.normals, present),
+            "com": truth.com,
+            "com_velocity": truth.com_velocity,
+            "rpy": roll_pitch_yaw(truth.R_wb),
+            "p": truth.centres + truth.contact_offsets(ground.normals, present),
             "contact_force": forces,
-            "in_contact": np.linalg.norm(forces, axis=1) > 1.0,
+            "in_contact": loads > 1.0,
             "end_effector": robot.end_effectors,
             "stance": ref.stance,
             "com_ref": ref.com,
             "com_velocity_ref": ref.com_velocity,
             "p_ref": ref.ends + dynamics.contact_offsets(ground.normals, present),
             "tick_ms": 1e3 * elapsed,
+            "base_estimate": qpos[:7].copy(),
+            "base_velocity_estimate": qvel[:6].copy(),
+            "com_estimate": dynamics.com,
+            "estimator_ms": 1e3 * estimator_time,
         }
         for name, value in sample.items():
             self.log[name].append(value)
         return command.torques
 
+    def _known(self, touching: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+        """Return the configuration and velocity the controller works with, and the time to estimate them."""
+        qpos, qvel = self.robot.data.qpos, self.robot.data.qvel
+        if self.estimator is None:
+            return qpos, qvel, 0.0
+        reading = self.sensors.read(qpos, qvel)
+        began = time.perf_counter()
+        self.estimator.update(reading, touching, self.robot.end_effectors.astype(bool), self.normals)
+        base, velocity = self.estimator.base()
+        elapsed = time.perf_counter() - began
+        known, known_velocity = np.zeros(23), np.zeros(22)
+        known[:7], known_velocity[:6] = base, velocity
+        known[1 + MOTORS], known_velocity[MOTORS] = reading.joint_angles.ravel(), reading.joint_rates.ravel()
+        known_velocity[WHEELS] = reading.wheel_rates
+        return known, known_velocity, elapsed
+
     def _slip(self, ground: Ground, ref: Reference, forces: np.ndarray) -> None:
         """Add up how far standing feet slide, and wheels sideways; a foot's rolling is no slip."""
-        standing = ref.stance & (forces[:, 2] > _FEELS)
+        standing = ref.stance & (forces[:, 2] > TOUCH)
         self.standing = np.where(standing, self.standing + 1, 0)
-        contact = contacts(self.dynamics, ground, ref.wheels)
+        contact = contacts(self.truth, ground, ref.wheels)
         velocity = contact.velocity * np.where(ref.wheels[:, None], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0])
         self.slip = np.where(
             self.standing[:, None] > 10, self.slip + _CONTROL_STEPS * self.step_time * velocity, 0.0

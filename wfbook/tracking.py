@@ -141,8 +141,11 @@ class Tracker:
 
     def start_ends(self) -> np.ndarray:
         """Return the centres of the legs' ends in the plan's first posture, ``(4, 3)``."""
-        normals = np.array([self.plan.terrain.regions[r].normal for r in self._standing_on])
-        return self.plan.p[0] + RADII[self._kinds][:, None] * normals
+        return self.plan.p[0] + RADII[self._kinds][:, None] * self.start_normals()
+
+    def start_normals(self) -> np.ndarray:
+        """Return the normals of the ground under the plan's first posture, ``(4, 3)``."""
+        return np.array([self.plan.terrain.regions[r].normal for r in self._standing_on])
 
     def update(
         self, t: float, robot: Go1Dynamics, touching: np.ndarray, forces: np.ndarray
