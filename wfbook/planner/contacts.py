@@ -32,6 +32,9 @@ class Contacts:
         zone: by region, ``(L, J)``: the leg rolls, and is in that region when the slot ends.
         passing: for each inner knot of a slot likewise; empty if the program does not know inner knots.
         pattern: ``(patterns, J)``: the set of legs that swing.
+        S: swing matrix, ``(L, J)``.
+        rolling: legs that stand on a wheel, ``(L, J)``; zeros where no wheel is allowed.
+        wheel: the wheel's dynamics matrix over all regions, ``(L, J)``; likewise.
         rows: constraints.
     """
 
@@ -43,6 +46,9 @@ class Contacts:
     zone: dict[int, Any]
     passing: list[dict[int, Any]]
     pattern: Any
+    S: Any
+    rolling: Any
+    wheel: Any
     rows: list[Any] = field(default_factory=list)
 
     @classmethod
@@ -64,15 +70,33 @@ class Contacts:
         # Alone in its group, a region is where the wheel is all the time: no variable of its own.
         alone = {r: wheel_stance[ground.group_of[r]] for r in regions if r not in shared and problem.wheels}
         inner = range(problem.knots_per_slot - 1 if inner_knots else 0)
+        foot_landing = each("foot_landing", regions)
+        wheel_landing = each("wheel_landing", regions, problem.wheels)
+        rows: list[Any] = []
+
+        def total(name: str, parts: Iterable[Any]) -> Any:
+            """Return the sum of parts, as a variable of its own if there are many: that keeps rows short."""
+            parts = list(parts)
+            if len(parts) < 2:
+                return parts[0] if parts else np.zeros(shape)
+            variable = cp.Variable(shape, name=name)
+            rows.append(variable == sum(parts))
+            return variable
+
+        rolling = total("rolling", wheel_stance.values())
         contacts = cls(
             problem,
             foot_stance=each("foot_stance", regions),
-            foot_landing=each("foot_landing", regions),
+            foot_landing=foot_landing,
             wheel_stance=wheel_stance,
-            wheel_landing=each("wheel_landing", regions, problem.wheels),
+            wheel_landing=wheel_landing,
             zone=each("zone", shared, problem.wheels) | alone,
             passing=[each(f"passing{i}_", shared, problem.wheels) | alone for i in inner],
             pattern=cp.Variable((len(problem.patterns), problem.slots), name="pattern"),
+            S=total("S", [*foot_landing.values(), *wheel_landing.values()]),
+            rolling=rolling,
+            wheel=total("wheel", [rolling, *wheel_landing.values()]) if problem.wheels else rolling,
+            rows=rows,
         )
         contacts._flow()
         contacts._pass()
@@ -80,24 +104,9 @@ class Contacts:
         return contacts
 
     @property
-    def S(self) -> Any:
-        """Swing matrix, ``(L, J)``."""
-        return sum(self.foot_landing.values()) + sum(self.wheel_landing.values())
-
-    @property
     def feet(self) -> Any:
         """Legs that stand on a foot, ``(L, J)``."""
         return sum(self.foot_stance.values())
-
-    @property
-    def rolling(self) -> Any:
-        """Legs that stand on a wheel, ``(L, J)``."""
-        return sum(self.wheel_stance.values()) if self.problem.wheels else np.zeros(self.shape)
-
-    @property
-    def wheel(self) -> Any:
-        """The wheel's dynamics matrix over all regions, ``(L, J)``."""
-        return self.rolling + sum(self.wheel_landing.values()) if self.problem.wheels else self.rolling
 
     @property
     def shape(self) -> tuple[int, int]:
