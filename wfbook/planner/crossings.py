@@ -6,6 +6,7 @@ choice is tried first, and what it costs more than the relaxation is searched fo
 """
 
 import heapq
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -33,12 +34,13 @@ class Crossings:
         """
         self._program, self._conic = program, conic
 
-    def solve(self, columns: np.ndarray, values: np.ndarray) -> Solution:
+    def solve(self, columns: np.ndarray, values: np.ndarray, cutoff: float) -> Solution:
         """Minimise over all crossings.
 
         Args:
             columns: of the discrete variables.
             values: theirs; NaN where a crossing leaves them open.
+            cutoff: if no crossing costs less, which one is best is not asked: the status is "cut".
 
         Returns:
             The best solution. Its bound holds for every crossing.
@@ -47,10 +49,12 @@ class Crossings:
         found = solve_fixed(self._conic, columns[~open_], values[~open_])
         if not open_.any() or found.status != "solved":
             return found
+        if found.bound >= cutoff:
+            return replace(found, status="cut", value=np.nan)
         best: Solution | None = None
         queue = [(found.bound, 0, values, found)]
         for count in range(1, _NODES):
-            if not queue or (best and queue[0][0] >= best.value * (1 - CLOSE)):
+            if not queue or queue[0][0] >= min(cutoff, best.value * (1 - CLOSE) if best else np.inf):
                 break
             _, _, known, relaxed = heapq.heappop(queue)
             rounded = self._where_it_is(known, relaxed.y)
@@ -74,9 +78,10 @@ class Crossings:
                     bound = max(answer.bound, relaxed.bound)
                     heapq.heappush(queue, (bound, 2 * count + side, child, answer))
         bound = min((entry[0] for entry in queue), default=np.inf)
+        if best is None and not queue:
+            return Solution("infeasible", np.inf, np.inf, found.y)
         if best is None:
-            status = "infeasible" if not queue else "failed"
-            return Solution(status, np.inf if not queue else np.nan, bound, found.y)
+            return Solution("cut", np.nan, bound, found.y)
         return Solution("solved", best.value, min(best.bound, bound), best.y)
 
     def _where_it_is(self, known: np.ndarray, y: np.ndarray) -> np.ndarray:

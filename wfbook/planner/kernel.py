@@ -160,21 +160,29 @@ class Kernel:
             found = self._bounds[_key(lower, upper)] = self._solve(lower, upper, cutoff)
         return found
 
-    def leaf(self, gait: Gait) -> Solution:
-        """Solve the exact program at fixed binaries; infeasible if the gait is excluded."""
+    def leaf(self, gait: Gait, cutoff: float = np.inf) -> Solution:
+        """Solve the exact program at fixed binaries; infeasible if the gait is excluded.
+
+        Args:
+            gait: with its regions.
+            cutoff: if the gait can't cost less, its cost may stay unknown (status "cut").
+        """
         key = gait.key
         if key in self.excluded:
             return Solution("infeasible", np.inf, np.inf, np.zeros(0))
-        if key not in self._leaves:
-            self._enter(gait, self._exact(gait))
+        known = self._leaves.get(key)
+        if known is None or (known.status == "cut" and known.bound < cutoff):
+            self._enter(gait, self._exact(gait, cutoff))
         return self._leaves[key]
 
-    def price(self, gaits: list[Gait]) -> list[float]:
-        """Return the exact costs of gaits; infinite where infeasible or excluded."""
+    def price(self, gaits: list[Gait], cutoff: float = np.inf) -> list[float]:
+        """Return the exact costs of gaits; infinite where infeasible, excluded or known to exceed a cutoff."""
         fresh = [g for g in gaits if g.key not in self._leaves and g.key not in self.excluded]
-        for gait, found in zip(fresh, self._shared(self._exact, [(g,) for g in fresh]), strict=True):
-            self._enter(gait, found)
-        return [self.leaf(gait).value for gait in gaits]
+        found = self._shared(self._exact, [(g, cutoff) for g in fresh])
+        for gait, solution in zip(fresh, found, strict=True):
+            self._enter(gait, solution)
+        leaves = [self.leaf(gait, cutoff) for gait in gaits]
+        return [leaf.value if leaf.status == "solved" else np.inf for leaf in leaves]
 
     def _enter(self, gait: Gait, found: Solution) -> None:
         """Remember a leaf; what it leaves open keeps the proven bound below its own."""
@@ -182,13 +190,43 @@ class Kernel:
         self._leaves[gait.key] = found
         if found.status == "failed":
             self.pruned = min(self.pruned, self._gait_bound(gait))
-        else:
+        elif found.status != "infeasible":
             self.pruned = min(self.pruned, found.bound)
 
-    def _exact(self, gait: Gait) -> Solution:
+    def _exact(self, gait: Gait, cutoff: float = np.inf) -> Solution:
         assigned = assignment(self.problem, gait, self.program.discrete)
         fixed = np.concatenate([assigned[k].ravel() for k in self.program.discrete])
-        return self._crossings.solve(self._discrete, fixed)
+        return self._crossings.solve(self._discrete, fixed, cutoff)
+
+    def placed(self, lower: np.ndarray, upper: np.ndarray) -> tuple[Solution, Gait | None]:
+        """Bound a box in which only regions are open by the exact program with the regions relaxed.
+
+        Returns:
+            The solution, and the gait that it rounds to, if that is admissible.
+        """
+        G = self.boxes.layout.G
+        gait = self.boxes.gait(lower)
+        known = (lower[G] == upper[G]).all(axis=0)
+        assigned = assignment(
+            self.problem, gait._replace(region=np.where(known, gait.region, UNKNOWN)), self.program.discrete
+        )
+        fixed = np.concatenate([assigned[k].ravel() for k in self.program.discrete])
+        chosen = ~np.isnan(fixed)
+        self.leaves += 1
+        found = solve_fixed(self.conic, self._discrete[chosen], fixed[chosen])
+        if found.status != "solved":
+            return found, None
+        shares = [self._occupied(r, gait, found.y) for r in range(self.problem.ground.count)]
+        rounded = gait._replace(region=np.where(known, gait.region, np.argmax(shares, axis=0)))
+        return found, rounded if self.boxes.admissible(rounded) else None
+
+    def _occupied(self, region: int, gait: Gait, y: np.ndarray) -> np.ndarray:
+        """Return to which part the contacts are in a region when slots end, ``(L, J)``."""
+        keys = [(name, region) for name in ("foot stance", "foot landing", "wheel landing", "zone")]
+        if ("zone", region) not in self.program.discrete:
+            keys[-1] = ("wheel stance", int(self.problem.ground.group_of[region]))
+        parts = [self.program.discrete[k] for k in keys if k in self.program.discrete]
+        return sum(self.conic.value(v, y) for v in parts)
 
     def priced(self) -> list[Gait]:
         """Return the feasible gaits that were solved exactly, the cheapest first."""

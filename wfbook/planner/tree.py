@@ -165,7 +165,7 @@ class Tree:
 
     def price(self, gait: Gait) -> float:
         """Return a gait's cost, and keep it if it is the best so far."""
-        value = self.kernel.leaf(gait).value
+        value = self.kernel.price([gait], self.cutoff)[0]
         if value < self.incumbent:
             self._keep(value, gait)
         return value
@@ -256,6 +256,8 @@ class _Split(Branchrule):
         found = kernel.bound(*box)
         if found.status == "solved":
             before = tree.incumbent
+            if self._placed(box):
+                return {"result": SCIP_RESULT.CUTOFF}
             self._round(kernel.values(found))
             if tree.incumbent < before:
                 tree.submit()
@@ -278,6 +280,20 @@ class _Split(Branchrule):
                     tree.model.chgVarUbNode(node, variable, float(up))
         return {"result": SCIP_RESULT.BRANCHED}
 
+
+    def _placed(self, box: tuple[np.ndarray, np.ndarray]) -> bool:
+        """Tell whether a box is of no interest in which only regions are open; price what it rounds to."""
+        tree, kernel, layout = self.tree, self.tree.kernel, self.tree.kernel.boxes.layout
+        modes = np.concatenate([layout.S.ravel(), layout.wheel.ravel()])
+        if (box[0] == box[1]).all() or (box[0][modes] < box[1][modes]).any():
+            return False
+        found, gait = kernel.placed(*box)
+        if found.bound >= tree.cutoff:
+            kernel.pruned = min(kernel.pruned, found.bound)
+            return True
+        if gait is not None:
+            tree.price(gait)
+        return False
 
     def _round(self, z: np.ndarray) -> None:
         """Price the gait of a relaxation that is integral, at least in swings and wheels."""
