@@ -10,7 +10,7 @@ from collections import defaultdict
 from typing import Any, NamedTuple
 
 import numpy as np
-from plan_reading import FOOT, GRAVITY, WHEEL, Trajectory
+from plan_reading import FOOT, GRAVITY, WHEEL, Plane, Trajectory
 
 LEGS = ("FL", "FR", "RL", "RR")
 CYCLIC = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
@@ -199,7 +199,11 @@ def _polynomial(duration: float, start: tuple, end: tuple, middle: tuple = ()) -
 
 
 def _stances(p: Trajectory, ledger: Ledger) -> None:
-    """Feet stand (19), wheels roll with the body (20, 21), contacts lie on their regions (22, 23)."""
+    """Feet stand (19), wheels roll with the body (20, 21), contacts lie on regions (22, 23).
+
+    A wheel lands on the region that D names, or stands there at the start; then it may be on any region
+    of the group, at every knot.
+    """
     for leg in range(4):
         for k in range(p.K):
             j = p.slot(k)
@@ -212,39 +216,44 @@ def _stances(p: Trajectory, ledger: Ledger) -> None:
                 ledger.add("20", moved[0] - p.dt * (p.v[k, 0] + p.v[k + 1, 0]) / 2, leg, k + 1)
                 ledger.add("21", moved[1], leg, k + 1)
             for knot in (k, k + 1):
-                _on_ground(p, ledger, leg, j, knot)
+                equation = "22" if p.kind(leg, j) == FOOT else "23"
+                _on_one_of(p.allowed_planes(leg, j), equation, p, ledger, leg, knot)
         for j in np.flatnonzero(p.S[leg]):
-            _on_ground(p, ledger, leg, j, (j + 1) * p.rho)
-        if p.S[leg, 0]:
-            ledger.add("22", max(0.0, min(plane.distance(p.p[0, leg]) for plane in p.planes)), leg, 0)
+            _on_one_of([p.plane(leg, j)], "22", p, ledger, leg, (j + 1) * p.rho)
+        _on_one_of(p.planes if p.S[leg, 0] else [p.plane(leg, 0)], "22", p, ledger, leg, 0)
 
 
-def _on_ground(p: Trajectory, ledger: Ledger, leg: int, j: int, knot: int) -> None:
-    equation = "22" if p.kind(leg, j) == FOOT else "23"
-    off = min(plane.distance(p.p[knot, leg]) for plane in p.allowed_planes(leg, j))
-    ledger.add(equation, max(0.0, off), leg, knot)
+def _on_one_of(
+    planes: list[Plane], equation: str, p: Trajectory, ledger: Ledger, leg: int, knot: int
+) -> None:
+    ledger.add(equation, min(plane.distance(p.p[knot, leg]) for plane in planes), leg, knot)
 
 
 def _forces(p: Trajectory, ledger: Ledger) -> None:
-    """Friction pyramids (26, 27) and rolling friction (28, 29), which opposes rolling."""
+    """Friction pyramids (26, 27), rolling friction (28, 29), which opposes rolling, and the largest force.
+
+    All three in the basis of one region that the contact is on when the interval begins or ends: a wheel
+    may have left the region of D.
+    """
     for leg in range(4):
         for k in range(p.K):
             if p.swings(leg, k):
                 continue
             j = p.slot(k)
-            kind = p.kind(leg, j)
+            kind, lam = p.kind(leg, j), p.lam[k, leg]
             planes = p.allowed_planes(leg, j)
-            # A wheel on the edge between two regions of a group may use either of them.
             near = [q for q in planes if min(q.distance(p.p[i, leg]) for i in (k, k + 1)) <= ledger.tolerance]
-            excess, rolling = [], []
+            found = []
             for plane in near or planes:
-                expected = np.zeros(3)
-                if kind == WHEEL:
-                    expected = -plane.rolling_resistance * (plane.n @ p.lam[k, leg]) * plane.t
-                excess.append(plane.friction_excess(p.lam[k, leg], kind) / p.weight)
-                rolling.append(np.abs(p.f[k, leg] - expected).max() / p.weight)
-            ledger.add("26", min(excess), leg, k)
-            ledger.add("28" if kind == FOOT else "29", min(rolling), leg, k)
+                normal = plane.n @ lam
+                resistance = plane.rolling_resistance if kind == WHEEL else 0.0
+                pyramid = plane.friction_excess(lam, kind)
+                rolling = np.abs(p.f[k, leg] + resistance * normal * plane.t).max()
+                large = max(0.0, normal - p.meta["limits"]["force"] * p.weight)
+                found.append((pyramid, rolling, large))
+            names = ("26", "28" if kind == FOOT else "29", "force limit")
+            for name, amount in zip(names, min(found, key=max), strict=True):
+                ledger.add(name, amount / p.weight, leg, k)
 
 
 def _bodies(p: Trajectory, ledger: Ledger) -> None:
@@ -261,8 +270,11 @@ def _bodies(p: Trajectory, ledger: Ledger) -> None:
 
 
 def _rest(p: Trajectory, ledger: Ledger) -> None:
-    """What the options claim beyond the paper: rest at the start and at the end, where a foot must stand."""
+    """What the paper leaves open: rest at the start, on top of the ground, and at the end, on a foot."""
     ledger.add("start", p.x[0, :2] - p.meta["start"], knot=0)
+    ledger.add("start", p.x[0, 2] - p.meta["com_height"] - p.p[0, :, 2].mean(), knot=0)
+    for leg in range(4):
+        ledger.add("start", max(plane.over(p.p[0, leg], ledger.tolerance) for plane in p.planes), leg, 0)
     for name in ("v", "theta", "omega"):
         ledger.add("start", getattr(p, name)[0], knot=0)
     options = p.meta["options"]
@@ -279,7 +291,7 @@ def _rest(p: Trajectory, ledger: Ledger) -> None:
 
 
 def _limits(p: Trajectory, ledger: Ledger) -> None:
-    """The limits of speed, tilt, force and step that the paper leaves open and the plan states."""
+    """The limits of speed, tilt and step that the paper leaves open and the plan states."""
     limits = p.meta["limits"]
     forward, backward = limits["speed"]
     for k in range(p.K + 1):
@@ -288,9 +300,6 @@ def _limits(p: Trajectory, ledger: Ledger) -> None:
         ledger.add("speed limit", np.maximum(0.0, np.abs(across) - limits["lateral_speed"]), knot=k)
         ledger.add("angle limit", np.maximum(0.0, np.abs(p.theta[k]) - limits["angle"]), knot=k)
     for leg in range(4):
-        for k in range(p.K):
-            normal = p.planes[p.region(leg, p.slot(k))].n @ p.lam[k, leg]
-            ledger.add("force limit", max(0.0, normal / p.weight - limits["force"]), leg, k)
         for j in np.flatnonzero(p.S[leg]):
             step = np.abs(p.p[(j + 1) * p.rho, leg, :2] - p.p[j * p.rho, leg, :2])
             ledger.add("step limit", np.maximum(0.0, step - limits["step"]), leg, j * p.rho)
@@ -302,10 +311,11 @@ def _limits(p: Trajectory, ledger: Ledger) -> None:
 def objective(plan: Any) -> float:
     """Work out the cost of a plan (eqs 31-33) with the weights in its meta.
 
-    Forces and bounds are in body weights. The height that is rewarded is that of the start.
+    Forces and bounds are in body weights. The height that is rewarded is that of the robot's nominal stance
+    above the ground under its legs.
     """
     p = plan if isinstance(plan, Trajectory) else Trajectory(plan)
-    w = p.meta["weights"]
+    w, ground = p.meta["weights"], _ground(p)
     terms = {name: 0.0 for name in w}
     terms["goal"] = np.sum((p.x[-1, :2] - p.meta["goal"]) ** 2)
     terms["goal_angle"] = np.sum(p.theta[-1] ** 2)
@@ -314,12 +324,23 @@ def objective(plan: Any) -> float:
         terms["force"] += np.sum((p.lam[k] / p.weight) ** 2)
         terms["bounds"] += np.sum(p.U_plus[k] + p.U_minus[k]) / p.weight
         terms["centroid"] += np.sum((p.x[k + 1, :2] - p.c[k, :2]) ** 2)
-        terms["height"] += (p.x[k + 1, 2] - p.x[0, 2]) ** 2
+        terms["height"] += (p.x[k + 1, 2] - p.meta["com_height"] - ground[k + 1]) ** 2
         terms["angle"] += np.sum(p.theta[k + 1] ** 2)
         terms["angular_rate"] += np.sum(p.omega[k + 1] ** 2)
     for j in range(p.J):
         terms["swing"] += (j + 1) * np.sum(p.S[:, j])
     return float(sum(w[name] * terms[name] for name in w))
+
+
+def _ground(p: Trajectory) -> list[float]:
+    """Height of the ground under the legs at each knot: the mean of p_z, less the arc of legs in the air."""
+    arc = _polynomial(1.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (p.meta["swing_height"], 0.0))
+    lift = [arc(i / p.rho) for i in range(p.rho)]
+    ground = []
+    for k in range(p.K + 1):
+        in_air = p.S[:, p.slot(k)].sum() if k < p.K else 0
+        ground.append((p.p[k, :, 2].sum() - in_air * lift[k % p.rho]) / 4)
+    return ground
 
 
 def _values(p: Trajectory, ledger: Ledger) -> None:
@@ -329,4 +350,5 @@ def _values(p: Trajectory, ledger: Ledger) -> None:
     if p.meta["stage"] == "relaxed":
         ledger.add("31-33", (objective(p) - value) / scale)
     ledger.add("bound", max(0.0, bound - value) / scale)
-    ledger.add("gap", gap - max(0.0, value - bound) / scale)
+    proven = max(0.0, value - bound) / scale
+    ledger.add("gap", 0.0 if gap == proven else gap - proven)  # both infinite where nothing is proven

@@ -32,14 +32,23 @@ class Plane:
         self.b = binormal / np.linalg.norm(binormal)
         self.t = np.cross(self.b, self.n)
 
-    def distance(self, point: np.ndarray) -> float:
-        """How far a contact point is off the polygon: off its plane or outside an edge (eq. 22)."""
-        worst = abs(float(self.n @ (point - self.origin)))
+    def outside(self, point: np.ndarray) -> float:
+        """How far a point of the plane is outside of the polygon's edges; negative inside."""
+        worst = -np.inf
         following = np.roll(self.corners, -1, axis=0)
         for here, there in zip(self.corners, following, strict=True):
             outward = np.cross(there - here, self.n)
             worst = max(worst, float(outward @ (point - here)) / np.linalg.norm(outward))
         return worst
+
+    def distance(self, point: np.ndarray) -> float:
+        """How far a contact point is off the polygon: off its plane or outside an edge (eq. 22)."""
+        return max(abs(float(self.n @ (point - self.origin))), self.outside(point))
+
+    def over(self, point: np.ndarray, tolerance: float) -> float:
+        """How far the polygon is above a point that is under it, not just under its edge; else 0."""
+        rise = float(self.n @ (self.origin - point)) / self.n[2]
+        return max(0.0, rise) if self.outside(np.add(point, (0.0, 0.0, rise))) < -tolerance else 0.0
 
     def friction_excess(self, force: np.ndarray, kind: int) -> float:
         """By how much a force is outside of the pyramid (eq. 26)."""
@@ -96,12 +105,13 @@ class Trajectory:
             return ("foot", "wheel").index(self.meta["start_end_effectors"][leg])
         return int(self.D[leg, j].sum(axis=0).argmax())
 
-    def region(self, leg: int, j: int) -> int:
-        return int(self.D[leg, j].sum(axis=1).argmax())
+    def plane(self, leg: int, j: int) -> Plane:
+        """The region of slot j: where a foot stands, where a wheel touched down, where either will land."""
+        return self.planes[int(self.D[leg, j].sum(axis=1).argmax())]
 
     def allowed_planes(self, leg: int, j: int) -> list[Plane]:
         """The planes that a leg may touch in slot j: a wheel all those of its region's group (eq. 23)."""
-        own = self.planes[self.region(leg, j)]
+        own = self.plane(leg, j)
         if self.kind(leg, j) == FOOT:
             return [own]
         return [plane for plane in self.planes if plane.group == own.group]

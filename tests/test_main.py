@@ -15,6 +15,7 @@ from wfbook import planner, simulate
 from wfbook.__main__ import main
 from wfbook.report import ProgressLine, plain
 from wfbook.results import ResultFolder
+from wfbook.table2 import trial
 from wfbook.terrain import flat, stepping_stones
 
 FILES = {"plan_relaxed.npz", "plan.npz", "run.npz", "metrics.json", "gait.png", "replay.html"}
@@ -47,6 +48,7 @@ def no_work(monkeypatch):
 
     monkeypatch.setattr(planner, "solve_executable", begun)
     monkeypatch.setattr(simulate, "run", begun)
+    monkeypatch.setattr(trial, "run", begun)
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +92,7 @@ def everything(folder):
 WRONG = {
     "no command": ([], "COMMAND"),
     "unknown command": (["fly"], "'fly'"),
-    "commands of later versions": (["table2"], "'table2'"),
+    "commands of later versions": (["paper"], "'paper'"),
     "no terrain": (["run"], "TERRAIN is missing"),
     "unknown terrain": (["run", "falt"], "did you mean 'flat'?"),
     "far-off terrain": (["run", "moon"], "unknown terrain 'moon'"),
@@ -116,6 +118,21 @@ WRONG = {
     "missing plan file": (["run", "--plan", "gone.npz"], "'gone.npz': No such file"),
     "plan and slots": (["run", "--plan", "gone.npz", "--slots", "3"], "--slots has no effect with --plan"),
     "plan and wheels": (["run", "--plan", "gone.npz", "--feet-only"], "--feet-only has no effect"),
+    "unknown row": (["table2", "--rows", "1,1,6"], "'1,1,6'"),
+    "unknown row of the paper's": (["table2", "--paper-rows", "1,1"], "'1,1'"),
+    "row not asked for": (
+        ["table2", "--rows", "1,1,5", "--paper-rows", "1,2,5"],
+        "1,2,5 is not among --rows",
+    ),
+    "paper rows without a cap": (["table2", "--paper-rows", "1,1,5", "--cap", "0"], "no effect with --cap 0"),
+    "no rows": (["table2", "--rows"], "--rows: none is left"),
+    "no gap for the table": (["table2", "--gap", "0"], "--gap: must be above 0"),
+    "no time for the table": (["table2", "--time-limit", "0"], "--time-limit: must be above 0"),
+    "negative cap": (["table2", "--cap", "-1"], "--cap: must be at least 0"),
+    "no time to grow": (["table2", "--growth-limit", "inf"], "--growth-limit: must be a finite number"),
+    "no runs": (["table2", "--repeat", "0"], "--repeat: must be at least 1"),
+    "a terrain for the table": (["table2", "flat"], "flat"),
+    "table out under a device": (["table2", "--out", "/dev/null/results"], "can't be written"),
     "out under a device": (["run", "flat", "--out", "/dev/null/results"], "can't be written"),
     "out in a closed system": (["run", "flat", "--out", "/proc/wfbook/results"], "can't be written"),
 }

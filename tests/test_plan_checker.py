@@ -5,27 +5,28 @@ import copy
 import numpy as np
 import plan_checker
 import pytest
+from handmade import (
+    APEX,
+    FOOT,
+    HEIGHT,
+    HIPS,
+    INERTIA,
+    MASS,
+    RHO,
+    WEIGHT,
+    WHEEL,
+    cost,
+    integrate,
+    roll_off_landing,
+    roll_over_edge,
+    squares,
+    step_onto_stones,
+    with_meta,
+)
 
 from wfbook.terrain import flat
 
-MASS, G = 13.0, 9.81
-WEIGHT = MASS * G
-INERTIA = np.diag([0.1, 0.3, 0.35])
-HIPS = np.array([[0.19, 0.13, -0.265], [0.19, -0.13, -0.265], [-0.19, 0.13, -0.265], [-0.19, -0.13, -0.265]])
-RHO, DT, APEX = 3, 0.1, 0.06
-FOOT, WHEEL = 0, 1
-WEIGHTS = ("goal", "goal_angle", "acceleration", "force", "bounds", "centroid", "swing", "height", "angle")
-WEIGHTS += ("angular_rate",)
-
-
-def squares(x, p, lam):
-    """U± of eq. 9 at their squares, by plain algebra: s²r² + λ²/s² without axis i, plus or minus 2 τ."""
-    r = p - x[:, None]
-    r = 0.5 * (r[1:] + r[:-1])
-    both = WEIGHT * r**2 + lam**2 / WEIGHT
-    both = both.sum(axis=2, keepdims=True) - both
-    torque = np.cross(r, lam)
-    return both + 2 * torque, both - 2 * torque
+G, DT, K = 9.81, 0.1, 9
 
 
 def hand_made_plan(rolling_resistance=0.0, stage="relaxed"):
@@ -34,9 +35,9 @@ def hand_made_plan(rolling_resistance=0.0, stage="relaxed"):
     The two standing legs share the weight so that nothing turns; U± lie above their squares by the same
     amount, which makes no torque.
     """
-    J, K = 3, 9
-    x = np.tile([0.0, 0.0, 0.265], (K + 1, 1))
-    p = np.add(np.tile(HIPS, (K + 1, 1, 1)), [0, 0, 0.265])
+    J = 3
+    x = np.tile([0.0, 0.0, HEIGHT], (K + 1, 1))
+    p = np.add(np.tile(HIPS, (K + 1, 1, 1)), [0, 0, HEIGHT])
     S = np.zeros((4, J), np.int8)
     S[[0, 3], 1] = 1
     D = np.zeros((4, J, 1, 2), np.int8)
@@ -63,7 +64,7 @@ def hand_made_plan(rolling_resistance=0.0, stage="relaxed"):
     lam[:3, [0, 3], 0] = foot_push[:3, None] / 2
     lam[6:, 0, 0] = foot_push[6:]
     a = (lam + f).sum(axis=1) / MASS - [0, 0, G]
-    v, x = _integrate(a, x[0])
+    v, x = integrate(a, x[0])
     p[:, 1:3, 0] += (x[:, 0] - x[0, 0])[:, None]
     p[6:, 3, 0] += x[6:, 0] - x[6, 0]
     p[:] = _swing_landing(p, v)
@@ -76,67 +77,16 @@ def hand_made_plan(rolling_resistance=0.0, stage="relaxed"):
         U_minus[:, 0] += np.maximum(0, 4 * torque)
     else:
         alpha = np.linalg.solve(INERTIA, (U_plus - U_minus).sum(axis=1).T / 4).T
-    omega, theta = _integrate(alpha, np.zeros(3))
+    omega, theta = integrate(alpha, np.zeros(3))
     standing = np.repeat(S == 0, RHO, axis=1).T
     c = np.array([p[k + 1, standing[k]].mean(axis=0) for k in range(K)])
-    true = np.cross(0.5 * ((p - x[:, None])[1:] + (p - x[:, None])[:-1]), lam).sum(axis=1)
-    meta = {
-        "stage": stage,
-        "mass": MASS,
-        "inertia": INERTIA.tolist(),
-        "torque_scale": WEIGHT,
-        "torque_mismatch_nm": np.sqrt(((alpha @ INERTIA - true) ** 2).mean(axis=0)).tolist(),
-        "swing_height": APEX,
-        "start": [0.0, 0.0],
-        "goal": [0.1, 0.0],
-        "stance": HIPS[:, :2].tolist(),
-        "limits": {
-            "speed": [0.8, 0.1],
-            "lateral_speed": 0.3,
-            "step": [0.3, 0.15],
-            "force": 0.75,
-            "angle": 0.3,
-            "rest_offset": [0.12, 0.06],
-        },
-        "start_end_effectors": ["foot", "wheel", "wheel", "foot"],
-        "reach_lower": (HIPS - [0.17, 0.08, 0.04]).tolist(),
-        "reach_upper": np.add(HIPS, [0.17, 0.08, 0.10]).tolist(),
-        "options": {
-            "patterns": [[], [0], [1], [2], [3], [0, 3], [1, 2]],
-            "final_stance": rolling_resistance == 0 and stage == "relaxed",
-            "stance_between_swings": True,
-        },
-        "weights": dict.fromkeys(WEIGHTS, 0.5),
-    }
     plan = {
-        "t": DT * np.arange(K + 1),
-        "x": x,
-        "v": v,
-        "theta": theta,
-        "omega": omega,
-        "a": a,
-        "alpha": alpha,
-        "p": p,
-        "lam": lam,
-        "f": f,
-        "U_plus": U_plus,
-        "U_minus": U_minus,
-        "S": S,
-        "D": D,
-        "c": c,
+        "t": DT * np.arange(K + 1), "x": x, "v": v, "theta": theta, "omega": omega, "a": a, "alpha": alpha,
+        "p": p, "lam": lam, "f": f, "U_plus": U_plus, "U_minus": U_minus, "S": S, "D": D, "c": c,
         "terrain": flat(rolling_resistance).to_dict(),
-        "meta": meta,
-    }
-    meta["objective"] = by_hand(plan)
-    meta["bound"] = 0.999 * meta["objective"]
-    meta["gap"] = 0.001
-    return plan
-
-
-def _integrate(a, start):
-    v = np.vstack((np.zeros(3), DT * np.cumsum(a, axis=0)))
-    x = start + np.vstack((np.zeros(3), DT * np.cumsum(0.5 * (v[1:] + v[:-1]), axis=0)))
-    return v, x
+    }  # fmt: skip
+    final_stance = rolling_resistance == 0 and stage == "relaxed"
+    return with_meta(plan, (FOOT, WHEEL, WHEEL, FOOT), final_stance, stage)
 
 
 def _swing_landing(p, v):
@@ -145,18 +95,6 @@ def _swing_landing(p, v):
     s = np.arange(1, RHO) / RHO
     p[4:6, 3, 0] += RHO * DT * v[6, 0] * (-4 * s**3 + 7 * s**4 - 3 * s**5)
     return p
-
-
-def by_hand(plan):
-    """Half the sum of all squares of eqs 31-33, vectorised where the checker loops."""
-    w = 0.5
-    F = plan["lam"] / WEIGHT
-    goal = plan["x"][-1, :2] - plan["meta"]["goal"]
-    parts = (goal, plan["theta"][-1], plan["a"], F, plan["x"][1:, :2] - plan["c"][:, :2], plan["theta"][1:])
-    squared = sum((part**2).sum() for part in parts) + (plan["omega"][1:] ** 2).sum()
-    squared += ((plan["x"][1:, 2] - plan["x"][0, 2]) ** 2).sum()
-    bounds = (plan["U_plus"] + plan["U_minus"]).sum() / WEIGHT
-    return w * float(squared + bounds + (plan["S"] * [1, 2, 3]).sum())
 
 
 VARIANTS = [(0.0, "relaxed"), (0.0, "polished"), (0.01, "relaxed"), (0.01, "polished")]
@@ -168,30 +106,56 @@ def test_a_valid_plan_passes(resistance, stage):
     assert violations == []
     assert max(worst.values()) < 1e-9
     named = " ".join(worst).split()
-    expected = [
-        "1",
-        "7",
-        "8",
-        "10-15",
-        "16",
-        "17",
-        "19",
-        "20",
-        "21",
-        "22",
-        "23",
-        "26",
-        "28",
-        "29",
-        "30",
-        "2-6",
-    ]
-    assert set(expected) <= set(named)
+    expected = {"1", "2-6", "7", "8", "10-15", *map(str, (16, 17, *range(19, 24), 26, 28, 29, 30))}
+    assert expected <= set(named)
 
 
-def test_the_objective_is_that_of_eqs_31_to_33():
-    plan = hand_made_plan()
-    assert plan_checker.objective(plan) == pytest.approx(by_hand(plan), rel=1e-12)
+ON_REGIONS = {
+    "feet step onto stones": step_onto_stones,
+    "wheels roll down": roll_over_edge,
+    "wheels roll up": lambda: roll_over_edge(15.0, "up"),
+    "a wheel lands on a ramp and leaves it": roll_off_landing,
+}
+
+
+@pytest.fixture(scope="module")
+def on_regions():
+    """The plans on several regions, made once."""
+    return {name: make() for name, make in ON_REGIONS.items()}
+
+
+@pytest.mark.parametrize("name", ON_REGIONS)
+def test_a_valid_plan_on_several_regions_passes(on_regions, name):
+    violations, worst = plan_checker.check(on_regions[name])
+    assert violations == []
+    assert max(worst.values()) < 1e-9
+    assert {"22", "26", "force limit", "start", "31-33"} <= set(worst)
+
+
+def test_the_plans_on_regions_do_what_they_are_for(on_regions):
+    """Else a checker blind to regions would pass all tests."""
+    stones, down, _, landing = on_regions.values()
+    assert stones["D"][0, -1, 1, FOOT] and stones["D"][1, -1, 2, FOOT]
+    for plan, first in ((down, 0), (landing, 1)):
+        region = plan_checker.Trajectory(plan).planes
+        assert plan["D"][0, -1, first, WHEEL]
+        assert region[first].distance(plan["p"][-1, 0]) > 1e-3
+        assert region[first + 1].distance(plan["p"][-1, 0]) < 1e-12
+        assert 0 < plan["p"][-1, 0, 0] - region[first + 1].corners[:, 0].min() < 0.1
+
+
+@pytest.mark.parametrize("make", [hand_made_plan, *ON_REGIONS.values()])
+def test_the_objective_is_that_of_eqs_31_to_33(make):
+    plan = make()
+    assert plan_checker.objective(plan) == pytest.approx(cost(plan), rel=1e-12)
+
+
+def test_forces_in_the_basis_of_the_wrong_region_break_friction_alone(on_regions):
+    violations, _ = plan_checker.check(roll_over_edge(forces_on="D"))
+    assert {v.equation for v in violations} == {"26", "29"}
+    assert {v.leg for v in violations} == {"FL", "FR"}
+    beyond = np.flatnonzero(on_regions["wheels roll down"]["p"][:-1, 0, 0] > 0.24)
+    assert {v.knot for v in violations} == set(beyond), "on the way over the edge either region will do"
 
 
 # What is broken, and the equation that must be named. Other equations may break along with it.
@@ -318,3 +282,95 @@ def test_a_violation_says_where():
     found = next(v for v in violations if v.equation == "28")
     assert (found.leg, found.knot) == ("FL", 1)
     assert found.amount == pytest.approx(0.1 / WEIGHT)
+
+
+def _name_region(plan, leg, first_slot, region):
+    """Let D say that a leg is on another region, from a slot on."""
+    D = plan["D"][leg, first_slot:]
+    D[:, region] = D.sum(axis=1)
+    D[:, np.arange(D.shape[1]) != region] = 0
+
+
+def _regions(plan):
+    return plan["terrain"]["regions"]
+
+
+def _one_group(plan):
+    for region in _regions(plan):
+        region["group"] = "all"
+
+
+def _use_group(plan, *elsewhere):
+    _one_group(plan)
+    _name_region(plan, *elsewhere)
+
+
+def _move(plan, region, *by):
+    _regions(plan)[region]["vertices"] = np.add(_regions(plan)[region]["vertices"], by).tolist()
+
+
+def _roof(plan):
+    """A second deck right above the first."""
+    _regions(plan).append(_regions(plan)[0] | {"group": "roof"})
+    _move(plan, -1, 0, 0, 0.02)
+    plan["D"] = np.pad(plan["D"], ((0, 0), (0, 0), (0, 1), (0, 0)))
+
+
+def _limit_between_normals(plan):
+    """A limit that FL's force keeps along the platform's normal and exceeds along the ramp's."""
+    ramp = plan_checker.Trajectory(plan).planes[1]
+    plan["lam"][-1, 0] *= 3
+    plan["meta"]["limits"]["force"] = (plan["lam"][-1, 0, 2] + ramp.n @ plan["lam"][-1, 0]) / 2 / WEIGHT
+
+
+def _height_term_of_flat_ground(plan):
+    """The cost if height counted from that of the start, as on flat ground."""
+    z, p = plan["x"][1:, 2], plan_checker._ground(plan_checker.Trajectory(plan))[1:]
+    plan["meta"]["objective"] += 0.5 * (((z - plan["x"][0, 2]) ** 2).sum() - ((z - HEIGHT - p) ** 2).sum())
+
+
+STONES, DOWN, LANDING = "feet step onto stones", "wheels roll down", "a wheel lands on a ramp and leaves it"
+# The plan, what is broken, and the equation and the leg that must be named.
+REGION_MUTATIONS = {
+    "wheel above the ramp": (DOWN, lambda q: q["p"][7, 0].__iadd__([0, 0, 1e-3]), "23", "FL"),
+    "wheel goes on level": (DOWN, lambda q: q["p"].__setitem__((slice(None), 1, 2), 0.0), "23", "FR"),
+    "wheel leaves its group": (DOWN, lambda q: _regions(q)[1].__setitem__("group", "x"), "23", "FL"),
+    "wheel drives on the ramp": (DOWN, lambda q: q["lam"].__setitem__((9, 0, 0), 0.0), "26", "FL"),
+    "friction pushes on the ramp": (DOWN, lambda q: q["f"][9, 0].__imul__(-1), "29", "FL"),
+    "friction is level": (DOWN, lambda q: q["f"].__setitem__((9, 0, 2), 0.0), "29", "FL"),
+    "large along the ramp's normal": (DOWN, _limit_between_normals, "force limit", "FL"),
+    "wheel starts elsewhere": (DOWN, lambda q: _name_region(q, 0, 0, 1), "22", "FL"),
+    "wheel lands elsewhere": (DOWN, lambda q: _name_region(q, 2, 1, 1), "22", "RL"),
+    "wheel lands where it rolls to": (LANDING, lambda q: _name_region(q, 0, 1, 2), "22", "FL"),
+    "D follows the wheel": (DOWN, lambda q: _name_region(q, 0, 3, 1), "16", "FL"),
+    "foot over an edge": (STONES, lambda q: _move(q, 1, 0.16, 0, 0.15 * 0.16), "22", "FL"),
+    "foot beside a leaning stone": (STONES, lambda q: _move(q, 2, 0, 0.1, 0.12 * 0.1), "22", "FR"),
+    "foot in a stone": (STONES, lambda q: _move(q, 1, 0, 0, 1e-3), "22", "FL"),
+    "foot lands elsewhere": (STONES, lambda q: _name_region(q, 1, 3, 0), "22", "FR"),
+    "foot elsewhere in its group": (STONES, lambda q: _use_group(q, 0, 1, 0), "22", "FL"),
+    "foot holds by the deck's pyramid": (
+        STONES,
+        lambda q: q["lam"].__setitem__((-1, 0), np.array([0.65, 0, 1]) * q["lam"][-1, 0, 2]),
+        "26",
+        "FL",
+    ),
+    "arc above the lower end": (STONES, lambda q: q["p"].__setitem__((4, 0, 2), 0.05), "2-6", "FL"),
+    "start under a roof": (STONES, _roof, "start", "RR"),
+    "start too high": (STONES, lambda q: q["meta"].__setitem__("com_height", HEIGHT - 1e-3), "start", None),
+    "height as on flat ground": (STONES, _height_term_of_flat_ground, "31-33", None),
+}
+
+
+@pytest.mark.parametrize("name", REGION_MUTATIONS)
+def test_a_plan_broken_on_several_regions_is_named(on_regions, name):
+    which, breaks, equation, leg = REGION_MUTATIONS[name]
+    plan = copy.deepcopy(on_regions[which])
+    breaks(plan)
+    violations, _ = plan_checker.check(plan)
+    assert (equation, leg) in {(violation.equation, violation.leg) for violation in violations}
+
+
+def test_feet_care_for_no_group(on_regions):
+    plan = copy.deepcopy(on_regions[STONES])
+    _one_group(plan)
+    assert plan_checker.check(plan)[0] == []

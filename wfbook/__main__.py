@@ -1,24 +1,36 @@
-"""The command line: ``python -m wfbook run TERRAIN`` and ``python -m wfbook lab``."""
+"""The command line: ``python -m wfbook run TERRAIN | table2 | lab``."""
 
 import argparse
 import contextlib
 import importlib
 import json
-import math
 import re
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from wfbook import terrain as ground
-from wfbook.report import ProgressLine, percent, plain, summary_table
-from wfbook.results import ResultFolder
+from wfbook.arguments import (
+    FAILED,
+    INTERRUPTED,
+    OK,
+    WRONG_INPUT,
+    CommandError,
+    Parser,
+    goal,
+    join_goal,
+    number,
+    result_folder,
+    whole,
+)
+from wfbook.report import ProgressLine, plain, search_line, summary_table
+from wfbook.table2 import command as table2
 
 if TYPE_CHECKING:
-    from wfbook.planner import Plan, Problem, Progress
+    from wfbook.planner import Plan, Problem
     from wfbook.simulate import Run
 
 FILES = ("plan_relaxed.npz", "plan.npz", "run.npz", "metrics.json", "gait.png", "replay.html")
@@ -33,16 +45,6 @@ PLANNING = {
 """Options of planning and their defaults; no goal means ``GOAL_PER_SLOT`` ahead for each slot."""
 GOAL_PER_SLOT = 0.1
 
-OK, FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
-
-
-class CommandError(Exception):
-    """Ends the program with one line on stderr and an exit code."""
-
-    def __init__(self, message: str, code: int) -> None:
-        super().__init__(message)
-        self.code = code
-
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line.
@@ -51,11 +53,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         argv: the arguments without the program's name; by default those of the process.
 
     Returns:
-        0 on success, 1 if the robot fell or nothing could be planned, 2 for wrong input, 130 if interrupted.
+        0 on success, 1 if the robot fell or something could not be planned, 2 for wrong input, 130 if
+        interrupted.
     """
     try:
         parser = _parser()
-        arguments, rest = parser.parse_known_args(_join_goal(sys.argv[1:] if argv is None else argv))
+        arguments, rest = parser.parse_known_args(join_goal(sys.argv[1:] if argv is None else argv))
         if arguments.command is _lab:
             return _lab(rest)
         if rest:
@@ -69,18 +72,11 @@ def main(argv: Sequence[str] | None = None) -> int:
         return INTERRUPTED
 
 
-class _Parser(argparse.ArgumentParser):
-    """An argument parser whose errors are one line."""
-
-    def error(self, message: str) -> NoReturn:
-        raise CommandError(f"{message} (see python -m {self.prog} --help)", WRONG_INPUT)
-
-
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(
+    parser = Parser(
         prog="wfbook", description="How wheeled-legged robots decide and move.", allow_abbrev=False
     )
-    commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=_Parser)
+    commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=Parser)
 
     run = commands.add_parser(
         "run", help="plan, control, simulate and draw on one terrain", allow_abbrev=False
@@ -89,83 +85,33 @@ def _parser() -> argparse.ArgumentParser:
     names = ", ".join(ground.BUILTIN_NAMES)
     run.add_argument("terrain", metavar="TERRAIN", nargs="?", help=f"{names}, or a terrain FILE.json")
     planning = run.add_argument_group("planning")
-    planning.add_argument(
-        "--goal", type=_goal, metavar="X,Y", help="where to go, metres (0.1 m ahead a slot)"
-    )
-    planning.add_argument("--slots", type=_whole(1), help="0.3 s swing slots (10)")
+    planning.add_argument("--goal", type=goal, metavar="X,Y", help="where to go, metres (0.1 m ahead a slot)")
+    planning.add_argument("--slots", type=whole(1), help="0.3 s swing slots (10)")
     planning.add_argument("--feet-only", action="store_true", default=None, help="plan without wheels")
     planning.add_argument(
         "--formulation", choices=("tight", "paper"), help="the program to search: tight, or the paper's big-M"
     )
-    planning.add_argument("--gap", type=_number(0.0, above=True), help="relative gap to prove (0.001)")
+    planning.add_argument("--gap", type=number(0.0, above=True), help="relative gap to prove (0.001)")
     planning.add_argument(
-        "--time-limit", type=_number(0.0, above=True), metavar="S", help="of the search (25 s)"
+        "--time-limit", type=number(0.0, above=True), metavar="S", help="of the search (25 s)"
     )
     planning.add_argument("--plan", metavar="FILE", help="execute this plan file instead of planning")
     execution = run.add_argument_group("execution")
-    execution.add_argument("--delay-ms", type=_whole(0), default=9, help="torque delay (9 ms)")
+    execution.add_argument("--delay-ms", type=whole(0), default=9, help="torque delay (9 ms)")
     execution.add_argument(
         "--state", choices=("estimated", "true"), default="true", help="what the controller sees"
     )
-    execution.add_argument("--seed", type=_whole(0), default=0, help="of everything random (0)")
+    execution.add_argument("--seed", type=whole(0), default=0, help="of everything random (0)")
     output = run.add_argument_group("output")
     output.add_argument("--out", metavar="DIR", help="folder for the results (runs/TERRAIN)")
     output.add_argument("--json", action="store_true", help="print the metrics as JSON instead of a table")
+
+    table2.add_to(commands)
 
     lab = commands.add_parser("lab", help="open the notebooks in JupyterLab", allow_abbrev=False)
     lab.set_defaults(command=_lab)
     lab.epilog = "Other options are passed on to JupyterLab."
     return parser
-
-
-def _join_goal(argv: Sequence[str]) -> list[str]:
-    """Write ``--goal X Y`` and ``--goal X,Y`` as ``--goal=X,Y``, which argparse reads with any sign."""
-    words = list(argv)
-    if "--goal" in words:
-        i = words.index("--goal")
-        n = 2 if "," in "".join(words[i + 1 : i + 2]) else 3
-        words[i : i + n] = ["--goal=" + ",".join(words[i + 1 : i + n])]
-    return words
-
-
-def _goal(text: str) -> tuple[float, float]:
-    try:
-        x, y = (float(part) for part in text.split(","))
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"must be two numbers X Y, is {text!r}") from None
-    if not (math.isfinite(x) and math.isfinite(y)):
-        raise argparse.ArgumentTypeError(f"must be finite, is {text!r}")
-    return x, y
-
-
-def _whole(least: int) -> Callable[[str], int]:
-    def whole(text: str) -> int:
-        try:
-            value = int(text)
-        except ValueError:
-            raise argparse.ArgumentTypeError(f"must be a whole number, is {text!r}") from None
-        if value < least:
-            raise argparse.ArgumentTypeError(f"must be at least {least}, is {text}")
-        return value
-
-    return whole
-
-
-def _number(least: float, above: bool = False) -> Callable[[str], float]:
-    def number(text: str) -> float:
-        try:
-            value = float(text)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            raise argparse.ArgumentTypeError(f"must be a finite number, is {text!r}")
-        if value < least or (above and value == least):
-            raise argparse.ArgumentTypeError(
-                f"must be {'above' if above else 'at least'} {least:g}, is {text}"
-            )
-        return value
-
-    return number
 
 
 def _run(arguments: argparse.Namespace) -> int:
@@ -178,12 +124,7 @@ def _run(arguments: argparse.Namespace) -> int:
     name = (plan or problem).terrain.name
     target = arguments.out or Path("runs") / _folder_name(name)
     with contextlib.ExitStack() as stack:
-        try:
-            folder = stack.enter_context(ResultFolder(target, FILES))
-        except OSError as error:
-            raise CommandError(
-                f"--out {str(target)!r} can't be written: {error.strerror}", WRONG_INPUT
-            ) from None
+        folder = stack.enter_context(result_folder(target, FILES))
         _load("wfbook.simulate", "wfbook.view.figures", "wfbook.view.replay")
         relaxed = None
         if plan is None:
@@ -274,21 +215,13 @@ def _planned(problem: "Problem", arguments: argparse.Namespace) -> "tuple[Plan, 
     from wfbook import planner
 
     with ProgressLine(sys.stderr) as line:
-
-        def show(now: "Progress") -> None:
-            incumbent = f"{now.incumbent:.4f}" if math.isfinite(now.incumbent) else "none"
-            line.show(
-                f"planning {now.time:6.1f} s  nodes {now.nodes:6d}  incumbent {incumbent}  "
-                f"bound {now.bound:.4f}  gap {percent(now.gap)}"
-            )
-
         try:
             return planner.solve_executable(
                 problem,
                 formulation=arguments.formulation,
                 gap=arguments.gap,
                 time_limit=arguments.time_limit,
-                progress=show,
+                progress=lambda now: line.show(f"planning {search_line(now)}"),
             )
         except (planner.InfeasibleError, planner.NoPlanError) as error:
             raise CommandError(" ".join(str(error).split()), FAILED) from None

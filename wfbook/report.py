@@ -2,10 +2,14 @@
 
 import math
 import time
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Self, TextIO
+from typing import TYPE_CHECKING, Any, Self, TextIO
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from wfbook.planner import Progress
 
 
 def plain(value: Any) -> Any:
@@ -22,6 +26,31 @@ def plain(value: Any) -> Any:
 def percent(gap: float | None) -> str:
     """Return a relative gap as text."""
     return f"{100.0 * gap:.2f} %" if gap is not None and math.isfinite(gap) else "unknown"
+
+
+def search_line(now: "Progress") -> str:
+    """Return where a search stands as one line of text."""
+    incumbent = f"{now.incumbent:.4f}" if math.isfinite(now.incumbent) else "none"
+    return (
+        f"{now.time:6.1f} s  nodes {now.nodes:6d}  incumbent {incumbent}  "
+        f"bound {now.bound:.4f}  gap {percent(now.gap)}"
+    )
+
+
+def aligned(rows: Sequence[Sequence[str]], left: Sequence[int] = (0,)) -> str:
+    """Return rows of cells as lines with aligned columns.
+
+    Args:
+        rows: equally many cells each, the heading first.
+        left: columns that begin at the same place; the others end there, as numbers do.
+    """
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = []
+    for row in rows:
+        cells = zip(row, widths, strict=True)
+        texts = [c.ljust(w) if i in left else c.rjust(w) for i, (c, w) in enumerate(cells)]
+        lines.append("  ".join(texts).rstrip())
+    return "\n".join(lines)
 
 
 def summary_table(metrics: dict[str, Any], folder: Path) -> str:
