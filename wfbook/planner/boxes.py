@@ -1,14 +1,19 @@
 """Boxes of gaits: which integers there are, and what follows from what.
 
 A *box* is a pair of integer vectors, lower and upper, over all branching variables: ``S[l, j]``,
-``wheel[l, j]`` and two kinds of sums that cut far deeper than single binaries: ``C[l, j]``, the swings of
-leg ``l`` up to slot ``j``, and ``T[j] = Σ_l C[l, j]``.
+``wheel[l, j]``, two kinds of sums that cut far deeper than single binaries, ``C[l, j]``, the swings of
+leg ``l`` up to slot ``j``, and ``T[j] = Σ_l C[l, j]``; and for regions the steps of a ladder,
+``G[m, l, j]``, 1 if the contact is in a region behind step m when slot j ends. Regions are ordered from
+back to front, so that one step of the ladder cuts the terrain in two.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from wfbook.planner.gait import Gait
+from wfbook.planner.ground import Places
 from wfbook.planner.problem import Problem
 
 
@@ -19,6 +24,7 @@ class Layout:
     Attributes:
         S, wheel, C: index arrays of shape ``(L, J)``; ``wheel`` is empty without wheels.
         T: ``(J,)`` index array.
+        G: ``(R−1, L, J)`` index array, empty on a single region.
         size: length of the vectors.
     """
 
@@ -26,17 +32,20 @@ class Layout:
     wheel: np.ndarray
     C: np.ndarray
     T: np.ndarray
+    G: np.ndarray
     size: int
 
     @classmethod
     def of(cls, problem: Problem) -> "Layout":
         """Return the layout for a problem."""
-        L, J = problem.legs, problem.slots
+        L, J, steps = problem.legs, problem.slots, problem.ground.count - 1
         n = L * J
         S = np.arange(n).reshape(L, J)
         wheel = n + S if problem.wheels else np.zeros((0, J), int)
         start = 2 * n if problem.wheels else n
-        return cls(S, wheel, start + S, start + n + np.arange(J), start + n + J)
+        T = start + n + np.arange(J)
+        G = start + n + J + np.arange(steps * n).reshape(steps, L, J)
+        return cls(S, wheel, start + S, T, G, start + n + J + steps * n)
 
 
 class Boxes:
@@ -50,19 +59,34 @@ class Boxes:
         """
         self.problem, self.layout = problem, Layout.of(problem)
         self._members = np.array([[leg in p for p in problem.patterns] for leg in range(problem.legs)])
+        ground = problem.ground
+        self._reachable = Places.of(problem, ground).reachable[ground.order]
+        self._group = ground.group_of[ground.order]
+        self._rank = np.argsort(ground.order)
 
-    def root(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Return the box of everything that is possible, propagated; None if nothing is."""
+    @cached_property
+    def _root(self) -> tuple[np.ndarray, np.ndarray] | None:
         J, L, layout = self.problem.slots, self.problem.legs, self.layout
         lower, upper = np.zeros(layout.size, int), np.ones(layout.size, int)
         upper[layout.C] = np.arange(1, J + 1)
         upper[layout.T] = L * np.arange(1, J + 1)
         if self.problem.final_stance:
             upper[layout.S[:, -1]] = 0
+        if not self._reachable.any(axis=0).all() or (self.problem.start_regions < 0).any():
+            return None
+        first = self._reachable.argmax(axis=0)
+        last = len(self._reachable) - 1 - self._reachable[::-1].argmax(axis=0)
+        steps = np.arange(1, len(self._reachable))[:, None, None]
+        lower[layout.G] = steps <= first
+        upper[layout.G] = steps <= last
         return self.propagate(lower, upper)
 
+    def root(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return the box of everything that is possible, propagated; None if nothing is."""
+        return self._root and (self._root[0].copy(), self._root[1].copy())
+
     def propagate(self, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """Tighten a box by what S, C, T, the patterns and the wheels imply of each other.
+        """Tighten a box by what S, C, T, the patterns, the wheels and the regions imply of each other.
 
         Returns:
             The tightened box, or None if it is empty.
@@ -85,6 +109,8 @@ class Boxes:
             np.maximum(C_low, T_low - (C_up.sum(axis=0) - C_up), out=C_low)
             np.minimum(C_up, T_up - (C_low.sum(axis=0) - C_low), out=C_up)
             if self.problem.wheels and not self._wheels(lower, upper, S_low, S_up):
+                return None
+            if layout.G.size and not self._regions(lower, upper, S_low, S_up):
                 return None
             lower[layout.S], upper[layout.S] = S_low, S_up
             lower[layout.C], upper[layout.C] = C_low, C_up
@@ -122,25 +148,77 @@ class Boxes:
         lower[layout.wheel], upper[layout.wheel] = low[:, 1:], up[:, 1:]
         return True
 
-    def gait(self, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return swing matrix and wheel's dynamics matrix, ``(L, J)`` integers, of a vector."""
-        S = np.rint(z[self.layout.S]).astype(int)
-        return S, np.rint(z[self.layout.wheel]).astype(int) if self.problem.wheels else np.zeros_like(S)
+    def _regions(self, lower: np.ndarray, upper: np.ndarray, S_low: np.ndarray, S_up: np.ndarray) -> bool:
+        """Propagate the ladder: its steps fall, and without a swing a foot stays and a wheel keeps its group."""
+        layout, problem = self.layout, self.problem
+        low, up = lower[layout.G], upper[layout.G]
+        low[:] = np.maximum.accumulate(low[::-1], axis=0)[::-1]
+        up[:] = np.minimum.accumulate(up, axis=0)
+        start = self._ladder(problem.start_regions)[:, :, None]
+        low, up = np.concatenate([start, low], axis=2), np.concatenate([start, up], axis=2)
+        fixed = np.ones_like(S_up, bool)
+        if problem.wheels and problem.ground.rolls_over_edges:
+            fixed = upper[layout.wheel] == 0
+        for j in range(problem.slots):
+            stays = (S_up[:, j] == 0) & fixed[:, j]
+            for at, other in ((j + 1, j), (j, j + 1)):
+                low[:, stays, at] = np.maximum(low[:, stays, at], low[:, stays, other])
+                up[:, stays, at] = np.minimum(up[:, stays, at], up[:, stays, other])
+            moved = (low[:, :, j] > up[:, :, j + 1]) | (up[:, :, j] < low[:, :, j + 1])
+            S_low[moved.any(axis=0) & fixed[:, j], j] = 1
+        if (low > up).any():
+            return False
+        # What is left of each ladder must hold a region in reach, and a rolling wheel's must share a group.
+        first, last = low.sum(axis=0), up.sum(axis=0)
+        for leg, j in zip(*np.nonzero(first[:, 1:] == last[:, 1:]), strict=True):
+            here = first[leg, j + 1]
+            if not self._reachable[here, leg, j]:
+                return False
+            known = first[leg, j] == last[leg, j]
+            if S_up[leg, j] == 0 and known and self._group[here] != self._group[first[leg, j]]:
+                return False
+        lower[layout.G], upper[layout.G] = low[:, :, 1:], up[:, :, 1:]
+        return True
 
-    def vector(self, S: np.ndarray, wheel: np.ndarray) -> np.ndarray:
+    def _ladder(self, region: np.ndarray) -> np.ndarray:
+        """Return the steps of the ladder for region indices, ``(R−1, …)``."""
+        steps = np.arange(1, len(self._rank)).reshape(-1, *[1] * np.ndim(region))
+        return (steps <= self._rank[region]).astype(int)
+
+    def gait(self, z: np.ndarray) -> Gait:
+        """Return the gait of a vector."""
+        z = np.rint(z).astype(int)
+        S = z[self.layout.S]
+        wheel = z[self.layout.wheel] if self.problem.wheels else np.zeros_like(S)
+        return Gait(S, wheel, self.problem.ground.order[z[self.layout.G].sum(axis=0)])
+
+    def vector(self, gait: Gait) -> np.ndarray:
         """Return the branching variables' values for a gait."""
         z = np.zeros(self.layout.size, int)
-        z[self.layout.S] = S
+        z[self.layout.S] = gait.S
         if self.problem.wheels:
-            z[self.layout.wheel] = wheel
-        z[self.layout.C] = np.cumsum(S, axis=1)
-        z[self.layout.T] = np.cumsum(S.sum(axis=0))
+            z[self.layout.wheel] = gait.wheel
+        z[self.layout.C] = np.cumsum(gait.S, axis=1)
+        z[self.layout.T] = np.cumsum(gait.S.sum(axis=0))
+        z[self.layout.G] = self._ladder(gait.region)
         return z
 
-    def admissible(self, S: np.ndarray, wheel: np.ndarray) -> bool:
-        """Tell whether a gait satisfies all that concerns integers alone."""
+    def of_modes(self, gait: Gait) -> tuple[np.ndarray, np.ndarray] | None:
+        """Return the box of all gaits with the swings and wheels of one, propagated; None if it is empty."""
         root = self.root()
-        z = self.vector(S, wheel)
+        if root is None:
+            return None
+        z = self.vector(gait._replace(region=np.zeros_like(gait.S)))
+        modes = np.setdiff1d(np.arange(self.layout.size), self.layout.G.ravel())
+        lower, upper = root
+        if (z[modes] < lower[modes]).any() or (z[modes] > upper[modes]).any():
+            return None
+        lower[modes] = upper[modes] = z[modes]
+        return self.propagate(lower, upper)
+
+    def admissible(self, gait: Gait) -> bool:
+        """Tell whether a gait satisfies all that concerns integers alone."""
+        root, z = self.root(), self.vector(gait)
         return (
             root is not None
             and bool((root[0] <= z).all() and (z <= root[1]).all())
@@ -163,8 +241,3 @@ def _narrow_sums(S_low: np.ndarray, S_up: np.ndarray, C_low: np.ndarray, C_up: n
         if j:
             np.maximum(C_low[:, j - 1], C_low[:, j] - S_up[:, j], out=C_low[:, j - 1])
             np.minimum(C_up[:, j - 1], C_up[:, j] - S_low[:, j], out=C_up[:, j - 1])
-
-
-def gait_key(S: np.ndarray, wheel: np.ndarray) -> bytes:
-    """Return a key for a gait."""
-    return np.concatenate([np.ravel(S), np.ravel(wheel)]).astype(np.int8).tobytes()

@@ -8,6 +8,7 @@ import numpy as np
 from wfbook.centroidal import Robot, bound_terms
 from wfbook.modes import END_EFFECTORS, LEGS
 from wfbook.planner.conic import Conic
+from wfbook.planner.gait import Gait
 from wfbook.planner.plan import Plan
 from wfbook.planner.problem import Limits, Problem, Weights
 from wfbook.planner.program import Program
@@ -31,7 +32,7 @@ def read(program: Program, bounds: bool = True) -> dict[str, list[np.ndarray]]:
 
 
 def plan_of(
-    problem: Problem, values: dict[str, Any], S: np.ndarray, wheel: np.ndarray, meta: dict[str, Any]
+    problem: Problem, values: dict[str, Any], gait: Gait, meta: dict[str, Any]
 ) -> Plan:
     """Assemble a plan from the program's values.
 
@@ -40,8 +41,7 @@ def plan_of(
         values: components of ``x, v, a, theta, omega, alpha, p, force, friction`` and, for a relaxed
             plan, ``U_plus`` and ``U_minus`` summed over legs in body weights. Without them U± are set
             to their squares.
-        S: ``(L, J)`` swing matrix.
-        wheel: ``(L, J)`` wheel's dynamics matrix.
+        gait: swings, end effectors and regions.
         meta: entries of ``meta`` besides those that describe the problem.
     """
     weight = problem.robot.weight
@@ -58,9 +58,9 @@ def plan_of(
             for i in range(3):
                 excess = np.maximum(total[i] - squares[i].sum(axis=1), 0.0)
                 squares[i] += excess[:, None] / len(LEGS)
+    S = np.asarray(gait.S, np.int8)
     stands = np.repeat(1 - S.T, problem.knots_per_slot, axis=0)
     c = (stands[..., None] * world["p"][1:]).sum(axis=1) / stands.sum(axis=1)[:, None]
-    D = np.stack([1 - wheel, wheel], axis=-1)[:, :, None, :].astype(np.int8)
     return Plan(
         t=problem.dt * np.arange(problem.knots + 1),
         **world,
@@ -68,12 +68,33 @@ def plan_of(
         f=weight * np.stack(friction, axis=-1),
         U_plus=weight * np.stack(sides[0], axis=-1),
         U_minus=weight * np.stack(sides[1], axis=-1),
-        S=S.astype(np.int8),
-        D=D,
+        S=S,
+        D=_dynamics_matrix(problem, gait),
         c=c,
         terrain=problem.terrain,
-        meta=describe(problem) | meta,
+        meta=describe(problem) | {"regions": np.asarray(gait.region).tolist()} | meta,
     )
+
+
+def _dynamics_matrix(problem: Problem, gait: Gait) -> np.ndarray:
+    """Return D, ``(L, J, R, E)``; a wheel keeps the region where it touched down (eq. 16)."""
+    D = np.zeros((*gait.S.shape, problem.ground.count, len(END_EFFECTORS)), np.int8)
+    for leg, region in enumerate(problem.start_regions):
+        for j in range(gait.S.shape[1]):
+            if gait.S[leg, j] or not gait.wheel[leg, j]:
+                region = gait.region[leg, j]
+            D[leg, j, region, int(gait.wheel[leg, j])] = 1
+    return D
+
+
+def gait_of(plan: Plan) -> Gait:
+    """Return a plan's gait.
+
+    Where wheels are when slots end is in ``meta["regions"]``; in a plan without it they stay where they
+    touched down.
+    """
+    regions = plan.meta.get("regions", plan.D.sum(axis=3).argmax(axis=2))
+    return Gait(plan.S.astype(int), plan.end_effector.astype(int), np.array(regions, int))
 
 
 def describe(problem: Problem) -> dict[str, Any]:

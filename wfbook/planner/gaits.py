@@ -1,10 +1,10 @@
 """Gaits a roboticist would try first, and small changes to a gait: the search's primal heuristics."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
-from wfbook.planner.boxes import gait_key
+from wfbook.planner.gait import UNKNOWN, Gait
 from wfbook.planner.kernel import Kernel
 from wfbook.planner.problem import Problem
 from wfbook.planner.symmetry import MIRROR, mirror_symmetric
@@ -16,11 +16,9 @@ _EXACT = 2  # gaits solved exactly in each round of the local search
 _ROUNDS = 6
 _BATCH = 8  # gaits bounded between two looks at the clock
 
-Gait = tuple[np.ndarray, np.ndarray]
-
 
 def templates(problem: Problem) -> Iterator[Gait]:
-    """Yield swing matrices and wheel's dynamics matrices of common gaits.
+    """Yield common gaits, their regions left open.
 
     Trots and crawls of several lengths, from either side; with wheels also trots in which some legs
     land on wheels at their first swing and then roll, and all of them on wheels but for one that puts a
@@ -30,13 +28,13 @@ def templates(problem: Problem) -> Iterator[Gait]:
     last = J - 1 if problem.final_stance else J
     feet = np.array([[int(e == "wheel")] * J for e in problem.start_end_effectors])
     lengths = sorted({last - i for i in (0, 1, 2, 3, last // 2)} & set(range(1, last + 1)))
-    yield np.zeros((L, J), int), feet
+    yield _open(np.zeros((L, J), int), feet)
     for cycle in (TROT, TROT[::-1], CRAWL, CRAWL[1:] + CRAWL[:1]):
         for swings in lengths:
             S = np.zeros((L, J), int)
             for j in range(swings):
                 S[list(cycle[j % len(cycle)]), j] = 1
-            yield S, feet
+            yield _open(S, feet)
     if not problem.wheels:
         return
     for rolling in range(1, 2**L):
@@ -49,75 +47,77 @@ def templates(problem: Problem) -> Iterator[Gait]:
                         if leg not in roll or not S[leg].any():
                             S[leg, j] = 1
                             wheel[leg, j:] = leg in roll
-                yield S, wheel
+                yield _open(S, wheel)
                 if len(roll) == L and steps == min(2, last):
                     for leg in (0, 2):
                         for j in {last - 1, (last + steps) // 2}:
                             stop, braked = S.copy(), wheel.copy()
                             stop[leg, j], braked[leg, j:] = 1, 0
-                            yield stop, braked
+                            yield _open(stop, braked)
 
 
-def neighbours(problem: Problem, S: np.ndarray, wheel: np.ndarray) -> Iterator[Gait]:
-    """Yield gaits one small change away: drop or shift a swing, change what a leg lands on."""
+def neighbours(problem: Problem, gait: Gait) -> Iterator[Gait]:
+    """Yield gaits one small change away, their regions open: drop or shift a swing, change what it lands on."""
+    S, wheel, _ = gait
     L, J = S.shape
     landed = [[(j, wheel[leg, j]) for j in np.flatnonzero(S[leg])] for leg in range(L)]
     for leg in range(L):
         for i, (j, kind) in enumerate(landed[leg]):
             rest = landed[leg][:i] + landed[leg][i + 1 :]
-            yield _with(problem, S, wheel, leg, rest)
+            yield _with(problem, gait, leg, rest)
             for other in (j - 1, j + 1):
                 if 0 <= other < J and other not in [s for s, _ in rest]:
-                    yield _with(problem, S, wheel, leg, sorted([*rest, (other, kind)]))
+                    yield _with(problem, gait, leg, sorted([*rest, (other, kind)]))
             if problem.wheels:
-                yield _with(problem, S, wheel, leg, sorted([*rest, (j, 1 - kind)]))
+                yield _with(problem, gait, leg, sorted([*rest, (j, 1 - kind)]))
     for pair in ((0, 3), (1, 2)):
         for j in range(J):
             if S[pair[0], j] and S[pair[1], j]:
-                dropped, kinds = S, wheel
+                changed = gait
                 for leg in pair:
                     rest = [s for s in landed[leg] if s[0] != j]
-                    dropped, kinds = _with(problem, dropped, kinds, leg, rest)
-                yield dropped, kinds
+                    changed = _with(problem, changed, leg, rest)
+                yield changed
 
 
-def _with(problem: Problem, S: np.ndarray, wheel: np.ndarray, leg: int, landings: list) -> Gait:
+def _with(problem: Problem, gait: Gait, leg: int, landings: list) -> Gait:
     """Return the gait with one leg's swings replaced by ``(slot, end effector)`` pairs."""
-    S, wheel = S.copy(), wheel.copy()
+    S, wheel = gait.S.copy(), gait.wheel.copy()
     S[leg] = 0
     wheel[leg] = problem.start_end_effectors[leg] == "wheel"
     for j, kind in landings:
         S[leg, j] = 1
         wheel[leg, j:] = kind
-    return S, wheel
+    return _open(S, wheel)
 
 
-def mirrored(gait: Gait) -> Gait:
-    """Return a gait with left and right exchanged."""
-    return gait[0][list(MIRROR)], gait[1][list(MIRROR)]
+def _open(S: np.ndarray, wheel: np.ndarray) -> Gait:
+    return Gait(S, wheel, np.full_like(S, UNKNOWN))
 
 
 def improve(
-    kernel: Kernel, stop: Callable[[], bool] = lambda: False
-) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
+    kernel: Kernel, first: Sequence[Gait] = (), stop: Callable[[], bool] = lambda: False
+) -> Iterator[tuple[float, Gait]]:
     """Yield ever better gaits: templates ranked by the QP, the best solved exactly, then changed bit by bit.
 
     Args:
         kernel: bounds and leaves of the problem.
+        first: gaits to try besides the templates.
         stop: asked now and then; once true, nothing more is tried.
 
     Yields:
-        Cost, swing matrix and wheel's dynamics matrix, each better than the one before.
+        Cost and gait, each better than the one before.
     """
     problem, seen = kernel.problem, set()
-    symmetric = mirror_symmetric(problem)
+    mirror = list(MIRROR) if mirror_symmetric(problem) else None
 
     def ranked(gaits: Iterable[Gait], below: float) -> list[Gait]:
         """Return the gaits not seen before whose QP bound is below a value, the lowest first."""
         fresh = []
         for gait in gaits:
-            keys = {gait_key(*gait)} | ({gait_key(*mirrored(gait))} if symmetric else set())
-            if not (keys & seen) and kernel.boxes.admissible(*gait):
+            images = [gait] + ([Gait(*(part[mirror] for part in gait))] if mirror else [])
+            keys = {image.modes for image in images}
+            if not (keys & seen) and kernel.boxes.of_modes(gait) is not None:
                 seen.update(keys)
                 fresh.append(gait)
         bounds: list[float] = []
@@ -130,11 +130,10 @@ def improve(
 
     best, current = np.inf, None
     for _ in range(_ROUNDS):
-        tried = ranked(templates(problem) if current is None else neighbours(problem, *current), best)[
-            :_EXACT
-        ]
+        candidates = [*first, *templates(problem)] if current is None else neighbours(problem, current)
+        tried = [g for g in kernel.complete(ranked(candidates, best)[:_EXACT]) if g is not None]
         costs = kernel.price(tried)
         if not costs or min(costs) >= best or stop():
             return
         best, current = min(costs), tried[int(np.argmin(costs))]
-        yield best, *current
+        yield best, current

@@ -12,8 +12,11 @@ import numpy as np
 from scipy import sparse
 
 from wfbook.planner import relaxation, tight
-from wfbook.planner.boxes import Boxes, gait_key
+from wfbook.planner.boxes import Boxes
 from wfbook.planner.conic import Boxed, Conic, Solution
+from wfbook.planner.contacts import assignment
+from wfbook.planner.crossings import Crossings
+from wfbook.planner.gait import UNKNOWN, Gait
 from wfbook.planner.presolve import solve_fixed
 from wfbook.planner.problem import Problem
 from wfbook.planner.program import Program
@@ -58,22 +61,26 @@ class Kernel:
         self._discrete = np.concatenate(
             [self.conic.columns(v).ravel() for v in self.program.discrete.values()]
         )
+        self._crossings = Crossings(self.program, self.conic)
         relaxed = relaxation.build(problem)
+        contacts, order = relaxed.contacts, problem.ground.order
         self._mirror = cp.Variable()
-        S, wheel, C = (cp.Variable(relaxed.S.shape) for _ in range(3))
+        S, wheel, C = (cp.Variable(contacts.shape) for _ in range(3))
         T = cp.Variable(problem.slots)
-        rows = [*relaxed.constraints, S == relaxed.S, self._mirror == mirror_row(S)]
+        ladder = [cp.Variable(contacts.shape) for _ in order[1:]]
+        rows = [*relaxed.constraints, S == contacts.S, self._mirror == mirror_row(S)]
         rows += [C[:, 0] == S[:, 0], C[:, 1:] == C[:, :-1] + S[:, 1:], cp.sum(C, axis=0) == T]
-        box = [S, C, T]
+        rows += [G == sum(map(contacts.occupancy, order[m:])) for m, G in enumerate(ladder, start=1)]
+        box = [S, C, T, *ladder]
         if problem.wheels:
-            rows.append(wheel == relaxed.wheel)
+            rows.append(wheel == contacts.wheel)
             box.insert(1, wheel)
         self._qp_conic = Conic.compile(relaxed.cost, rows)
         self._columns = np.concatenate([self._qp_conic.columns(v).ravel() for v in box])
-        self._qp_discrete = np.concatenate(
-            [self._qp_conic.columns(v).ravel() for v in relaxed.discrete.values()]
-        )
-        self._qp_keys = list(relaxed.discrete)
+        self._ladder = np.array([self._qp_conic.columns(v) for v in ladder], int)
+        discrete = contacts.discrete()
+        self._qp_discrete = np.concatenate([self._qp_conic.columns(v).ravel() for v in discrete.values()])
+        self._qp_keys = list(discrete)
         self._qp = Boxed(self._symmetry_broken(), self._columns)
         self._bounds: dict[bytes, Solution] = {}
         self._leaves: dict[bytes, Solution] = {}
@@ -153,50 +160,127 @@ class Kernel:
             found = self._bounds[_key(lower, upper)] = self._solve(lower, upper, cutoff)
         return found
 
-    def leaf(self, S: np.ndarray, wheel: np.ndarray) -> Solution:
-        """Solve the exact program at fixed binaries; infeasible if the gait is excluded."""
-        key = gait_key(S, wheel)
+    def leaf(self, gait: Gait, cutoff: float = np.inf) -> Solution:
+        """Solve the exact program at fixed binaries; infeasible if the gait is excluded.
+
+        Args:
+            gait: with its regions.
+            cutoff: if the gait can't cost less, its cost may stay unknown (status "cut").
+        """
+        key = gait.key
         if key in self.excluded:
             return Solution("infeasible", np.inf, np.inf, np.zeros(0))
-        if key not in self._leaves:
-            self._enter((S, wheel), self._exact(S, wheel))
+        known = self._leaves.get(key)
+        if known is None or (known.status == "cut" and known.bound < cutoff):
+            self._enter(gait, self._exact(gait, cutoff))
         return self._leaves[key]
 
-    def price(self, gaits: list[tuple[np.ndarray, np.ndarray]]) -> list[float]:
-        """Return the exact costs of gaits; infinite where infeasible or excluded."""
-        fresh = [g for g in gaits if gait_key(*g) not in self._leaves and gait_key(*g) not in self.excluded]
-        for gait, found in zip(fresh, self._shared(self._exact, fresh), strict=True):
-            self._enter(gait, found)
-        return [self.leaf(*gait).value for gait in gaits]
+    def price(self, gaits: list[Gait], cutoff: float = np.inf) -> list[float]:
+        """Return the exact costs of gaits; infinite where infeasible, excluded or known to exceed a cutoff."""
+        fresh = [g for g in gaits if g.key not in self._leaves and g.key not in self.excluded]
+        found = self._shared(self._exact, [(g, cutoff) for g in fresh])
+        for gait, solution in zip(fresh, found, strict=True):
+            self._enter(gait, solution)
+        leaves = [self.leaf(gait, cutoff) for gait in gaits]
+        return [leaf.value if leaf.status == "solved" else np.inf for leaf in leaves]
 
-    def _enter(self, gait: tuple[np.ndarray, np.ndarray], found: Solution) -> None:
-        """Remember a leaf; one without an answer keeps the proven bound below its own."""
+    def _enter(self, gait: Gait, found: Solution) -> None:
+        """Remember a leaf; what it leaves open keeps the proven bound below its own."""
         self.leaves += 1
-        self._leaves[gait_key(*gait)] = found
+        self._leaves[gait.key] = found
         if found.status == "failed":
-            self.pruned = min(self.pruned, self._gait_bound(*gait))
+            self.pruned = min(self.pruned, self._gait_bound(gait))
+        elif found.status != "infeasible":
+            self.pruned = min(self.pruned, found.bound)
 
-    def _exact(self, S: np.ndarray, wheel: np.ndarray) -> Solution:
-        assigned = tight.assignment(self.problem, S, wheel)
+    def _exact(self, gait: Gait, cutoff: float = np.inf) -> Solution:
+        assigned = assignment(self.problem, gait, self.program.discrete)
         fixed = np.concatenate([assigned[k].ravel() for k in self.program.discrete])
-        return solve_fixed(self.conic, self._discrete, fixed)
+        return self._crossings.solve(self._discrete, fixed, cutoff)
 
-    def priced(self) -> list[tuple[np.ndarray, np.ndarray]]:
+    def placed(self, lower: np.ndarray, upper: np.ndarray) -> tuple[Solution, Gait | None]:
+        """Bound a box in which only regions are open by the exact program with the regions relaxed.
+
+        Returns:
+            The solution, and the gait that it rounds to, if that is admissible.
+        """
+        G = self.boxes.layout.G
+        gait = self.boxes.gait(lower)
+        known = (lower[G] == upper[G]).all(axis=0)
+        assigned = assignment(
+            self.problem, gait._replace(region=np.where(known, gait.region, UNKNOWN)), self.program.discrete
+        )
+        fixed = np.concatenate([assigned[k].ravel() for k in self.program.discrete])
+        chosen = ~np.isnan(fixed)
+        self.leaves += 1
+        found = solve_fixed(self.conic, self._discrete[chosen], fixed[chosen])
+        if found.status != "solved":
+            return found, None
+        shares = [self._occupied(r, gait, found.y) for r in range(self.problem.ground.count)]
+        rounded = gait._replace(region=np.where(known, gait.region, np.argmax(shares, axis=0)))
+        return found, rounded if self.boxes.admissible(rounded) else None
+
+    def _occupied(self, region: int, gait: Gait, y: np.ndarray) -> np.ndarray:
+        """Return to which part the contacts are in a region when slots end, ``(L, J)``."""
+        keys = [(name, region) for name in ("foot stance", "foot landing", "wheel landing", "zone")]
+        if ("zone", region) not in self.program.discrete:
+            keys[-1] = ("wheel stance", int(self.problem.ground.group_of[region]))
+        parts = [self.program.discrete[k] for k in keys if k in self.program.discrete]
+        return sum(self.conic.value(v, y) for v in parts)
+
+    def priced(self) -> list[Gait]:
         """Return the feasible gaits that were solved exactly, the cheapest first."""
-        shape = (2, self.problem.legs, self.problem.slots)
         feasible = [(found.value, key) for key, found in self._leaves.items() if found.status == "solved"]
-        gaits = [np.frombuffer(key, np.int8).reshape(shape).astype(int) for _, key in sorted(feasible)]
-        return [(S, wheel) for S, wheel in gaits]
+        return [Gait.from_key(key, self.problem.legs) for _, key in sorted(feasible)]
 
-    def gait_bounds(self, gaits: list[tuple[np.ndarray, np.ndarray]]) -> list[float]:
-        """Return the QP's lower bounds of the costs of gaits."""
+    def gait_bounds(self, gaits: list[Gait]) -> list[float]:
+        """Return the QP's lower bounds of the costs of gaits, whose regions may be open."""
         self.qps += len(gaits)
-        return self._shared(self._gait_bound, gaits)
+        return self._shared(self._gait_bound, [(gait,) for gait in gaits])
 
-    def _gait_bound(self, S: np.ndarray, wheel: np.ndarray) -> float:
-        assigned = tight.assignment(self.problem, S, wheel)
+    def _gait_bound(self, gait: Gait) -> float:
+        return self._gait_qp(gait).bound
+
+    def _gait_qp(self, gait: Gait) -> Solution:
+        assigned = assignment(self.problem, gait, self._qp_keys)
         fixed = np.concatenate([assigned[k].ravel() for k in self._qp_keys])
-        return solve_fixed(self._qp_conic, self._qp_discrete, fixed).bound
+        known = ~np.isnan(fixed)
+        return solve_fixed(self._qp_conic, self._qp_discrete[known], fixed[known])
+
+    def complete(self, gaits: list[Gait]) -> list[Gait | None]:
+        """Choose regions for gaits that leave them open, slot by slot where the QP would like them to be.
+
+        Returns:
+            For each gait one with regions, or None where the choice led nowhere.
+        """
+        if self.problem.ground.count == 1:
+            return [gait._replace(region=np.zeros_like(gait.S)) for gait in gaits]
+        self.qps += len(gaits)
+        return self._shared(self._dive, [(gait,) for gait in gaits])
+
+    def _dive(self, gait: Gait) -> Gait | None:
+        box = self.boxes.of_modes(gait)
+        G = self.boxes.layout.G
+        while box is not None:
+            lower, upper = box
+            known = (lower[G] == upper[G]).all(axis=0)
+            places = self.boxes.gait(lower).region
+            partial = gait._replace(region=np.where(known, places, UNKNOWN))
+            if known.all():
+                return partial
+            found = self._gait_qp(partial)
+            if found.status != "solved":
+                return None
+            wanted = np.rint(found.y[self._ladder]).astype(int)
+            # The first slot that is open, and with it what the QP has decided anyway.
+            slot = np.flatnonzero(~known.all(axis=0))[0]
+            sure = np.abs(found.y[self._ladder] - wanted).max(axis=0) < INTEGRAL
+            take = ~known & (np.arange(known.shape[1]) == slot) | (~known & sure)
+            lower, upper = lower.copy(), upper.copy()
+            for at, values in ((lower, wanted), (upper, wanted)):
+                at[G] = np.where(take, np.clip(values, lower[G], upper[G]), at[G])
+            box = self.boxes.propagate(lower, upper)
+        return None
 
     def split(
         self, lower: np.ndarray, upper: np.ndarray, solution: Solution, cutoff: float

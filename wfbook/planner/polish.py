@@ -16,7 +16,9 @@ from scipy import sparse
 from wfbook.centroidal import contact_torque
 from wfbook.planner import tight
 from wfbook.planner.conic import Conic
-from wfbook.planner.extract import fill, plan_of, problem_of, read
+from wfbook.planner.contacts import assignment
+from wfbook.planner.crossings import settle
+from wfbook.planner.extract import fill, gait_of, plan_of, problem_of, read
 from wfbook.planner.plan import Plan
 from wfbook.planner.presolve import solve_fixed
 from wfbook.planner.problem import Problem
@@ -67,8 +69,8 @@ class Polisher:
             ``meta["relaxed_torque_mismatch_nm"]`` that of the relaxed plan; :func:`repaired` judges.
         """
         problem, weight, conic = self.problem, self.problem.robot.weight, self._conic
-        S, wheel = plan.S.astype(float), plan.end_effector.astype(float)
-        known = tight.assignment(problem, S, wheel)
+        gait = gait_of(plan)
+        known = settle(problem, assignment(problem, gait, self.program.discrete), plan.p)
         columns = np.concatenate([self._program_columns[key].ravel() for key in self.program.discrete])
         fixed = np.concatenate([known[key].ravel() for key in self.program.discrete])
         lever, force = _middle_levers(plan), [plan.lam[..., i] / weight for i in range(3)]
@@ -153,7 +155,7 @@ class Polisher:
         meta = plan.meta | {"stage": "polished", "polish_iterations": steps}
         # The weights of the record are those of the program that chose the gait.
         problem = replace(self.problem, weights=problem_of(plan).weights)
-        polished = plan_of(problem, values, plan.S.astype(float), plan.end_effector.astype(float), meta)
+        polished = plan_of(problem, values, gait_of(plan), meta)
         return polished.with_meta(
             torque_mismatch_nm=torque_mismatch(polished).tolist(),
             relaxed_torque_mismatch_nm=torque_mismatch(plan).tolist(),

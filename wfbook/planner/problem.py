@@ -2,12 +2,14 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
 from wfbook.centroidal import Robot
 from wfbook.modes import DIAGONAL_PATTERNS, END_EFFECTORS, LEGS
-from wfbook.terrain import Region, Terrain
+from wfbook.planner.ground import GroundMap
+from wfbook.terrain import Terrain
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,7 @@ class Problem:
     """A planning problem (Paper A, section II).
 
     Attributes:
-        terrain: one level region in this version.
+        terrain: the regions that may be touched.
         goal: ``(x, y)`` where the centre of mass should be at the end; a cost, not a constraint.
         slots: number of slots ``N_j``; in each, a leg either swings or stands.
         slot_duration: of one slot, in seconds.
@@ -127,19 +129,10 @@ class Problem:
             raise ValueError(
                 f"patterns: {self.patterns!r}, expected sets of legs 0 to 3, the empty one among them"
             )
-        self._check_terrain()
+        self._check_goal()
 
-    def _check_terrain(self):
-        """Refuse terrain this version can't plan on, and goals outside of it."""
-        regions = self.terrain.regions
-        if len(regions) != 1 or abs(regions[0].normal[2] - 1.0) > 1e-9:
-            raise ValueError(
-                f"terrain: {self.terrain.name!r} is not one level region, all this version plans on"
-            )
-        for name in ("start", "goal"):
-            place = getattr(self, name)
-            if self.terrain.region_at(*place) is None:
-                raise ValueError(f"{name}: {tuple(place)} lies outside the terrain {self.terrain.name!r}")
+    def _check_goal(self):
+        """Refuse a goal that no plan comes near."""
         distance = float(np.hypot(*np.subtract(self.goal, self.start)))
         furthest = self.limits.speed[0] * self.duration
         if distance > furthest and not self.beyond_reach:
@@ -148,10 +141,10 @@ class Problem:
                 f"{furthest:.2f} m at {self.limits.speed[0]} m/s in {self.duration:.1f} s"
             )
 
-    @property
-    def region(self) -> Region:
-        """The region everything stands on."""
-        return self.terrain.regions[0]
+    @cached_property
+    def ground(self) -> GroundMap:
+        """The terrain as the program sees it."""
+        return GroundMap.of(self.terrain)
 
     @property
     def legs(self) -> int:
@@ -179,11 +172,24 @@ class Problem:
         return "wheel" in self.end_effectors
 
     @property
-    def ground(self) -> float:
-        """Height of the level region."""
-        return float(self.region.height(*self.start))
-
-    @property
     def start_contacts(self) -> np.ndarray:
         """``(L, 2)`` contact points at time 0."""
         return np.asarray(self.start, float) + self.robot.stance + self.start_offsets
+
+    @cached_property
+    def start_regions(self) -> np.ndarray:
+        """``(L,)`` index of the region under each leg at time 0, the highest; -1 where there is none."""
+        found = [self.terrain.region_at(*place) for place in self.start_contacts]
+        return np.array([-1 if region is None else region for region in found])
+
+    @property
+    def start_heights(self) -> np.ndarray:
+        """``(L,)`` height of the ground under each leg at time 0; NaN where there is none."""
+        places = zip(self.start_contacts, self.start_regions, strict=True)
+        regions = self.terrain.regions
+        return np.array([regions[r].height(*place) if r >= 0 else np.nan for place, r in places])
+
+    @property
+    def start_height(self) -> float:
+        """Height of the centre of mass at time 0: the nominal one above the mean of the contacts."""
+        return float(self.start_heights.mean()) + self.robot.height

@@ -33,6 +33,7 @@ class Program:
         wheel: dynamics matrix of the wheel, ``D[:, :, 0, 1]``, ``(L, J)`` expression.
         constraints: by the name of their group.
         cost: eq. 31.
+        ground: height of the ground under the legs, the mean over legs, ``(K+1,)`` or a number.
         lever: ``p − x`` at mid-interval, components of shape ``(K, L)``.
         discrete: the variables that must be integers, by name.
     """
@@ -53,6 +54,7 @@ class Program:
     S: Any
     wheel: Any
     constraints: dict[str, list[Any]]
+    ground: Any
     cost: Any = None
     lever: list[Any] = field(default_factory=list)
     discrete: dict[Any, Any] = field(default_factory=dict)
@@ -76,6 +78,7 @@ class Grid:
         step: ``(K, J)`` weight of a slot's step in the foot's place at knot ``k + 1`` (eq. 6).
         lift: ``(K, J)`` weight of the velocity at lift-off.
         land: ``(K, J)`` weight of the velocity at touch-down.
+        climb: ``(K, J)`` weight of the difference of the ends' heights (eq. 5).
         apex: ``(K+1, J)`` height of a swing of unit apex.
         age: ``(K,)`` intervals since the slot began, at knot ``k + 1``.
     """
@@ -85,6 +88,7 @@ class Grid:
     step: np.ndarray
     lift: np.ndarray
     land: np.ndarray
+    climb: np.ndarray
     apex: np.ndarray
     age: np.ndarray
 
@@ -97,9 +101,12 @@ class Grid:
         spread = np.kron(np.eye(J), np.ones((rho, 1)))
         begin = np.zeros((K, K + 1))
         begin[np.arange(K), rho * (np.arange(K) // rho)] = 1.0
-        apex = np.vstack([np.zeros(J), np.kron(np.eye(J), septic_basis(np.arange(1, rho + 1) / rho)[:, 2:])])
+        vertical = septic_basis(np.arange(1, rho + 1) / rho)
+        # The apex is a given height above the mean of the ends.
+        climb = np.kron(np.eye(J), vertical[:, [1]] + 0.5 * vertical[:, [2]])
+        apex = np.vstack([np.zeros(J), np.kron(np.eye(J), vertical[:, [2]])])
         columns = [np.kron(np.eye(J), basis[:, [i]]) for i in (2, 1, 3)]
-        return cls(spread, begin, columns[0], T * columns[1], T * columns[2], apex, age)
+        return cls(spread, begin, columns[0], T * columns[1], T * columns[2], climb, apex, age)
 
 
 def common(
@@ -126,8 +133,12 @@ def common(
     bounds = [[cp.Variable((K, L) if per_leg else K, name=f"U{sign}{i}") for i in range(3)] for sign in "+-"]
     total = [[cp.sum(u, axis=1) if per_leg else u for u in side] for side in bounds]
     centroid = [cp.Variable(K, name=f"c{i}") for i in range(2)]
+    level, swing_height = problem.ground.level, problem.robot.swing_height
+    if level is None:
+        bumps = swing_height * (Grid.of(problem).apex @ S.T)
+        level = cp.sum(p[2] - bumps, axis=1) / L
     program = Program(
-        problem, x, v, a, theta, omega, alpha, p, force, friction, *total, centroid, S, wheel, constraints={}
+        problem, x, v, a, theta, omega, alpha, p, force, friction, *total, centroid, S, wheel, {}, level
     )
     dt = problem.dt
 
@@ -151,17 +162,16 @@ def common(
         program.add(
             "reach", lever[i] >= ones * robot.reach_lower[:, i], lever[i] <= ones * robot.reach_upper[:, i]
         )
-    height = problem.ground + robot.height
-    program.add("reach", *within(x[2] - height, robot.reach[2]))
     program.add("speed", v[0] <= limits.speed[0], v[0] >= -limits.speed[1])
     program.add("speed", *(side for i in (1, 2) for side in within(v[i], limits.lateral_speed)))
     program.add("speed", *(side for angle in theta for side in within(angle, limits.angle)))
 
-    place = (*problem.start, height)
+    place = (*problem.start, problem.start_height)
     program.add(
         "start",
         *(x[i][0] == place[i] for i in range(3)),
         *(p[i][0] == problem.start_contacts[:, i] for i in (0, 1)),
+        p[2][0] == problem.start_heights,
     )
     program.add("start", *(z[0] == 0 for z in (*v, *theta, *omega)))
     if problem.final_stance:
@@ -199,7 +209,7 @@ def _above_squares(u: Any, pair: tuple[Any, Any], per_leg: bool) -> list[Any]:
 def motion_cost(program: Program) -> Any:
     """State eqs 31–33 but for the bounds U± (see :class:`~.problem.Weights`)."""
     w, problem, K = program.problem.weights, program.problem, program.problem.knots
-    height = problem.ground + problem.robot.height
+    rise = program.x[2] - problem.robot.height - program.ground
     goal = cp.hstack([program.x[i][K] - problem.goal[i] for i in range(2)])
     terms = [
         w.goal * cp.sum_squares(goal),
@@ -207,7 +217,7 @@ def motion_cost(program: Program) -> Any:
         w.acceleration * sum(cp.sum_squares(a) for a in program.a),
         w.force * sum(cp.sum_squares(F) for F in program.force),
         w.centroid * sum(cp.sum_squares(c) for c in program.centroid),
-        w.height * cp.sum_squares(program.x[2][1:] - height),
+        w.height * cp.sum_squares(rise[1:]),
         w.angle * sum(cp.sum_squares(angle[1:]) for angle in program.theta),
         w.angular_rate * sum(cp.sum_squares(rate[1:]) for rate in program.omega),
         w.swing * cp.sum(program.S @ np.arange(1, problem.slots + 1)),

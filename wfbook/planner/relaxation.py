@@ -3,7 +3,8 @@
 The search solves hundreds of relaxations, so they must be cheap. This one is a QP: rotation is
 dropped, but the squares that bound the torque (eq. 9) stay in the cost, for ``U⁺ + U⁻`` is never less
 than the sum of its squares. It knows feet only where slots begin and end, and forces only by their
-sum over legs. Each shortening is a bound:
+sum over legs. Where the ground is not one level plane,
+the height above it costs what it costs at best. Each shortening is a bound:
 
 * ``Σ_k r_k² ≥ ρ r̄²`` with the mean over a slot's knots, for levers and for the centroid;
 * ``Σ_l F_l² ≥ N²/m`` for ``m`` standing legs that carry ``N`` together, which is split by the number
@@ -18,9 +19,12 @@ import cvxpy as cp
 import numpy as np
 
 from wfbook.centroidal import GRAVITY, midpoint_integration
+from wfbook.friction import friction_pyramid
+from wfbook.planner.contacts import Contacts
+from wfbook.planner.ground import Places, Surface
 from wfbook.planner.problem import Problem
 from wfbook.planner.program import Grid, within
-from wfbook.planner.tight import centroid_bounds, flow, mccormick, pattern_hull
+from wfbook.planner.tight import centroid_bounds, mccormick, region_shares
 from wfbook.swing import quintic_basis, septic_basis
 
 
@@ -31,92 +35,191 @@ class Relaxation:
     Attributes:
         cost: a lower bound of eq. 31.
         constraints: of the QP.
-        S: swing matrix, ``(L, J)`` expression.
-        wheel: the wheel's dynamics matrix, ``(L, J)`` expression; zeros where no wheel is allowed.
-        discrete: variables that are integers in the program, by the keys of :func:`.tight.assignment`.
+        contacts: its discrete variables.
     """
 
     cost: Any
     constraints: list[Any]
-    S: Any
-    wheel: Any
-    discrete: dict[Any, Any]
+    contacts: Contacts
 
 
 def build(problem: Problem) -> Relaxation:
     """State the QP for a problem, with binaries relaxed to ``[0, 1]``."""
-    J, K, L, dt = problem.slots, problem.knots, problem.legs, problem.dt
-    w, robot, limits = problem.weights, problem.robot, problem.limits
-    stance = {e: cp.Variable((L, J)) for e in problem.end_effectors}
-    landing = {e: cp.Variable((L, J)) for e in problem.end_effectors}
-    S = sum(landing.values())
-    wheel = stance["wheel"] + landing["wheel"] if problem.wheels else np.zeros((L, J))
-    chosen = cp.Variable((len(problem.patterns), J))
-    sizes, hull = pattern_hull(problem, S, chosen)
-    discrete = {"pattern": chosen} | {("stance", e): v for e, v in stance.items()}
-    discrete |= {("landing", e): v for e, v in landing.items()}
-    constraints = flow(problem, S, stance, landing) + hull
+    J, K, rho, dt = problem.slots, problem.knots, problem.knots_per_slot, problem.dt
+    w, robot, limits, ground = problem.weights, problem.robot, problem.limits, problem.ground
+    contacts = Contacts.of(problem, inner_knots=False)
+    S = contacts.S
+    constraints = list(contacts.rows)
     cost = w.swing * cp.sum(S @ np.arange(1, J + 1))
 
     x, v, a = ([cp.Variable(n) for _ in range(3)] for n in (K + 1, K + 1, K))
-    height = problem.ground + robot.height
     rise = x[2]
-    x[2] = height + rise
-    place = (*problem.start, height)
+    x[2] = problem.start_height + rise
+    place = (*problem.start, problem.start_height)
     constraints += [r == 0 for r in midpoint_integration(x, v, a, dt)]
     constraints += [x[i][0] == place[i] for i in range(3)] + [v[i][0] == 0 for i in range(3)]
-    constraints += [v[0] <= limits.speed[0], v[0] >= -limits.speed[1], *within(rise, robot.reach[2])]
+    constraints += [v[0] <= limits.speed[0], v[0] >= -limits.speed[1]]
     if problem.final_stance:
         constraints += [v[i][K] == 0 for i in range(3)] + [S[:, -1] == 0]
     cost += w.goal * sum(cp.square(x[i][K] - problem.goal[i]) for i in range(2))
     cost += w.acceleration * sum(cp.sum_squares(a[i]) for i in range(3))
-    cost += w.height * cp.sum_squares(rise)
 
-    force_cost, force_rows = _forces(problem, a, stance, sizes)
-    lever_cost, lever_rows = _levers(problem, x, S, stance, landing, sizes)
-    vertical = _vertical_levers(problem, x[2], sizes)
-    cost = cost + force_cost + lever_cost + vertical
-    return Relaxation(cost, constraints + force_rows + lever_rows, S, wheel, discrete)
+    places = Places.of(problem, ground)
+    shares, rows = region_shares(contacts, places)
+    constraints += rows
+    if ground.level is not None:
+        constraints += within(rise, robot.reach[2])
+        cost += w.height * cp.sum_squares(rise) + _vertical_levers(problem, x[2], contacts.sizes)
+    else:
+        constraints += _reach_down(contacts, shares, x[2][rho::rho])
+        cost += _best_heights(problem) @ cp.sum(contacts.sizes, axis=1)
+    for part, rows in (_forces(contacts, a), _levers(contacts, x, shares)):
+        cost = cost + part
+        constraints += rows
+    return Relaxation(cost, constraints, contacts)
 
 
-def _forces(problem: Problem, a: list[Any], stance: dict, sizes: Any) -> tuple[Any, list[Any]]:
+def _forces(contacts: Contacts, a: list[Any]) -> tuple[Any, list[Any]]:
     """Bound the cost of force by its sum over legs; state eqs 1, 26 and 29 for that sum."""
-    K, L, region = problem.knots, problem.legs, problem.region
+    problem, sizes = contacts.problem, contacts.sizes
+    K, L = problem.knots, problem.legs
     spread = Grid.of(problem).spread
-    weight = problem.weights.force + 4 * problem.weights.bounds
+    weight, most = problem.weights.force + 4 * problem.weights.bounds, problem.limits.force
     counts = L - np.arange(sizes.shape[0])
     chosen = spread @ sizes.T
     # The variable is what is squared, for CVXPY gives the square of anything else a variable of its own.
     squared = cp.Variable((K, sizes.shape[0]))
     parts = squared @ np.diag(np.sqrt(counts)) - 1 + chosen
-    rows = [parts >= 0, parts <= problem.limits.force * chosen @ np.diag(counts)]
+    surfaces = problem.ground.surfaces
+    steepest = max(_upward(s) for s in surfaces)
+    rows = [parts >= 0, parts <= most * steepest * chosen @ np.diag(counts)]
     cost = weight * (cp.sum_squares(squared) - cp.sum((1 - chosen) @ np.diag(1.0 / counts)))
     normal = 1.0 + a[2] / GRAVITY
-    rows.append(cp.sum(parts, axis=1) == normal)
-    on_wheels = 0
+    plain = len(surfaces) == 1 and surfaces[0].level
+    along, across, upward, more = (_on_level if plain else _on_surfaces)(contacts, a, normal, spread)
+    rows.append(cp.sum(parts, axis=1) == upward)
+    cost += weight / L / GRAVITY**2 * cp.sum_squares(a[1] if plain else GRAVITY * across)
+    resists = problem.wheels and any(s.rolling_resistance > 0 for s in surfaces)
+    # A square of the acceleration itself is cheaper than one of an expression.
+    cost += weight / L * (cp.sum_squares(a[0]) / GRAVITY**2 if not resists else cp.sum_squares(along))
+    return cost, rows + more
+
+
+def _upward(surface: Surface) -> float:
+    """Return the largest vertical force for a unit of normal force."""
+    n, t, b = surface.basis
+    mu = np.max(list(surface.friction.values()), axis=0)
+    return float(n[2] + mu[0] * abs(t[2]) + mu[1] * abs(b[2]))
+
+
+def _on_level(
+    contacts: Contacts, a: list[Any], normal: Any, spread: np.ndarray
+) -> tuple[Any, Any, Any, list[Any]]:
+    """Share the normal force between feet and wheels on one level surface.
+
+    Newton's law leaves nothing free in the other two directions: what is not rolling friction is contact
+    force.
+
+    Returns:
+        The contact force along x, y and z, ``(K,)``, and constraints.
+    """
+    problem, surface = contacts.problem, contacts.problem.ground.surfaces[0]
+    most, on_wheels, rows = problem.limits.force, 0, []
     if problem.wheels:
-        on_wheels = cp.Variable(K, nonneg=True)
-        rows.append(on_wheels <= problem.limits.force * (spread @ cp.sum(stance["wheel"], axis=0)))
+        on_wheels = cp.Variable(problem.knots, nonneg=True)
+        rows.append(on_wheels <= most * (spread @ cp.sum(contacts.rolling, axis=0)))
     on_feet = normal - on_wheels
-    rows.append(on_feet >= 0)
-    rows.append(on_feet <= problem.limits.force * (spread @ cp.sum(stance["foot"], axis=0)))
-    # Newton's law leaves nothing free in the other two: what is not rolling friction is contact force.
+    rows += [on_feet >= 0, on_feet <= most * (spread @ cp.sum(contacts.feet, axis=0))]
     along, across = a[0] / GRAVITY, a[1] / GRAVITY
-    cost += weight / L / GRAVITY**2 * cp.sum_squares(a[1])
-    if problem.wheels and region.rolling_resistance > 0:
-        along = along + region.rolling_resistance * on_wheels
-        cost += weight / L * cp.sum_squares(along)
-    else:
-        cost += weight / L / GRAVITY**2 * cp.sum_squares(a[0])
-    rows += within(along, region.mu_foot * on_feet + region.mu_wheel * on_wheels)
-    rows += within(across, region.mu_foot * on_feet + region.mu_wheel_lateral * on_wheels)
-    return cost, rows
+    if problem.wheels and surface.rolling_resistance > 0:
+        along = along + surface.rolling_resistance * on_wheels
+    foot, wheel = surface.friction["foot"], surface.friction["wheel"]
+    rows += within(along, foot[0] * on_feet + wheel[0] * on_wheels)
+    rows += within(across, foot[1] * on_feet + wheel[1] * on_wheels)
+    return along, across, normal, rows
 
 
-def _levers(
-    problem: Problem, x: list[Any], S: Any, stance: dict, landing: dict, sizes: Any
-) -> tuple[Any, list[Any]]:
+def _on_surfaces(
+    contacts: Contacts, a: list[Any], normal: Any, spread: np.ndarray
+) -> tuple[Any, Any, Any, list[Any]]:
+    """Share the force between feet and wheels on surfaces of several slopes or frictions.
+
+    Returns:
+        The contact force along x, y and z, ``(K,)``, and constraints.
+    """
+    problem = contacts.problem
+    most, total, drag, rows, wheels = problem.limits.force, [0, 0, 0], [0, 0, 0], [], 0
+    for surface in problem.ground.surfaces:
+        for e in problem.end_effectors:
+            n, t, b = (cp.Variable(problem.knots) for _ in range(3))
+            rows += [side <= 0 for side in friction_pyramid(n, t, b, *surface.friction[e])]
+            rows.append(n <= most * (spread @ cp.sum(_carrying(contacts, e, surface), axis=0)))
+            for force, direction in zip((n, t, b), surface.basis, strict=True):
+                total = [c + d * force if d else c for c, d in zip(total, direction, strict=True)]
+            if e == "wheel":
+                wheels = wheels + n
+                resisted = surface.rolling_resistance * surface.basis[1]
+                drag = [c - d * n if d else c for c, d in zip(drag, resisted, strict=True)]
+    if problem.wheels:
+        rows.append(wheels <= most * (spread @ cp.sum(contacts.rolling, axis=0)))
+    rows += [a[i] / GRAVITY == total[i] + drag[i] for i in range(2)]
+    rows.append(normal == total[2] + drag[2])
+    return *total, rows
+
+
+def _carrying(contacts: Contacts, end_effector: str, surface: Surface) -> Any:
+    """Return an upper bound of which legs may push on a surface during a slot, ``(L, J)``.
+
+    A wheel that crosses an edge pushes on both sides of it, and if it can pass a whole region within a
+    slot, on what its ends do not show.
+    """
+    if end_effector == "foot":
+        return sum(contacts.foot_stance[r] for r in surface.regions)
+    problem, ground = contacts.problem, contacts.problem.ground
+    farthest = max(problem.limits.speed) * problem.slot_duration
+    total = 0
+    for g, members in enumerate(ground.groups):
+        inside = [r for r in members if r in surface.regions]
+        short = any(np.ptp(ground.regions[r].vertices[:, 0]) <= farthest for r in inside)
+        if set(members) <= set(inside) or (inside and short):
+            total = total + contacts.wheel_stance[g]
+        else:
+            total = total + sum(contacts.before(r) + contacts.zone[r] for r in inside)
+    return total
+
+
+def _reach_down(contacts: Contacts, shares: dict, z: Any) -> list[Any]:
+    """State eq. 30 vertically where slots end, on ground that is not one level plane."""
+    problem, heights = contacts.problem, 0
+    for r, (*slopes, constant) in enumerate(problem.ground.planes):
+        heights = heights + constant * contacts.occupancy(r)
+        heights = heights + sum(slopes[i] * part for i, part in shares[r].items() if slopes[i])
+    lever = heights - np.ones((problem.legs, 1)) @ cp.reshape(z, (1, problem.slots), order="C")
+    low, high = problem.robot.reach_lower[0, 2], problem.robot.reach_upper[0, 2]
+    return [lever >= low, lever <= high]
+
+
+def _best_heights(problem: Problem) -> np.ndarray:
+    """Return the least that height and vertical levers cost a slot in which n legs swing, ``(N,)``.
+
+    The mean over legs of the vertical lever at mid-interval is ``h n/L − m`` for a height m above the
+    ground; ``Σ_l r² ≥ L mean²``, and the height term of eq. 31 is at least ``Σ_k (m_k − h₀)²`` over
+    mid-intervals, for the first of its knots costs nothing.
+    """
+    L, rho, w, robot = problem.legs, problem.knots_per_slot, problem.weights, problem.robot
+    profile = robot.swing_height * septic_basis(np.arange(rho + 1) / rho)[:, 2]
+    bump = 0.5 * (profile[1:] + profile[:-1])
+    n = np.arange(max(map(len, problem.patterns)) + 1)
+    raised = np.outer(n, bump) / L
+    levers = 4 * w.bounds * L
+    # The minimum over m of height (m − h₀)² + levers (raised − m)².
+    both = w.height * levers / (w.height + levers)
+    return (both * (raised - robot.height) ** 2).sum(axis=1)
+
+
+def _levers(contacts: Contacts, x: list[Any], shares: dict) -> tuple[Any, list[Any]]:
     """Bound the horizontal cost of levers and centroid; state eqs 19–22 and 30 at slot ends."""
+    problem, S, sizes = contacts.problem, contacts.S, contacts.sizes
     J, K, L, rho = problem.slots, problem.knots, problem.legs, problem.knots_per_slot
     w, robot, limits = problem.weights, problem.robot, problem.limits
     ones, legs = np.ones((1, J)), np.ones((L, 1))
@@ -135,14 +238,14 @@ def _levers(
         if problem.wheels and i == 0:
             low, high = -limits.speed[1], limits.speed[0]
             rolled, exact = mccormick(
-                stance["wheel"],
+                contacts.rolling,
                 legs @ cp.reshape(ends[1:] - ends[:-1], (1, J), order="C"),
                 low * problem.slot_duration,
                 high * problem.slot_duration,
             )
             age = problem.dt * grid.age[:rho].mean()
             rolled_mean, exact_mean = mccormick(
-                stance["wheel"],
+                contacts.rolling,
                 legs @ cp.reshape(during - ends[:-1], (1, J), order="C"),
                 low * age,
                 high * age,
@@ -152,6 +255,8 @@ def _levers(
             extremes = [min(low * r, high * r) for r in reach], [max(low * r, high * r) for r in reach]
             rows += exact + exact_mean + [slack >= sum(extremes[0]) * S, slack <= sum(extremes[1]) * S]
         rows.append(place[:, 1:] == place[:, :-1] + step + rolled)
+        if any(i in share for share in shares.values()):
+            rows.append(place[:, 1:] == sum(share[i] for share in shares.values()))
         nominal = robot.stance[:, [i]] @ ones
         lever = place - legs @ cp.reshape(ends, (1, J + 1), order="C")
         rows += within(lever[:, 1:] - nominal, robot.reach[i])
@@ -178,7 +283,7 @@ def _levers(
         varied = x[i][1:] - grid.spread @ during
         if problem.wheels:
             most = 0.5 * (rho - 1) * problem.dt * max(*limits.speed, limits.lateral_speed)
-            rolling = grid.spread @ cp.sum(stance["wheel"], axis=0)
+            rolling = grid.spread @ cp.sum(contacts.rolling, axis=0)
             about, varied = varied, cp.Variable(K, nonneg=True)
             rows += [varied >= side - most * rolling for side in (about, -about)]
         cost += w.centroid * cp.sum_squares(varied)
@@ -197,7 +302,7 @@ def _vertical_levers(problem: Problem, z: Any, sizes: Any) -> Any:
     n = np.arange(sizes.shape[0])
     spread = Grid.of(problem).spread
     swinging, square = spread @ (sizes.T @ n), spread @ (sizes.T @ n**2)
-    above = 0.5 * (z[1:] + z[:-1]) - problem.ground
+    above = 0.5 * (z[1:] + z[:-1]) - problem.ground.level
     root = np.sqrt(L)
     mixed = cp.sum_squares(root * above - cp.multiply(h, swinging) / root)
     return 4 * problem.weights.bounds * (mixed + cp.sum(cp.multiply(h**2, swinging - square / L)))

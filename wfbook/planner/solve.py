@@ -7,9 +7,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from wfbook.planner import bigm
-from wfbook.planner.boxes import gait_key
 from wfbook.planner.explain import InfeasibleError, NoPlanError, conflicting_groups
-from wfbook.planner.extract import fill, plan_of, read
+from wfbook.planner.extract import fill, gait_of, plan_of, read
+from wfbook.planner.gait import Gait
 from wfbook.planner.kernel import Kernel
 from wfbook.planner.plan import Plan
 from wfbook.planner.polish import Polisher, repaired
@@ -146,7 +146,7 @@ class Search:
 
     def exclude(self, plan: Plan) -> None:
         """Cut a plan's gait off."""
-        self.kernel.excluded.add(gait_key(plan.S, plan.end_effector))
+        self.kernel.excluded.add(gait_of(plan).key)
 
     def close(self) -> None:
         """End the worker process."""
@@ -168,18 +168,18 @@ class Search:
                 raise KeyboardInterrupt
             raise NoPlanError(f"no plan found within {self._spent:.1f} s")
         self._bound, self._root_bound, self._status = bound, tree.root_bound, status
-        return self._plan(*tree.best[1:])
+        return self._plan(tree.best[1])
 
     def known(self) -> Iterator[Plan]:
         """Yield plans of the gaits priced so far that are not excluded, the cheapest first."""
-        for S, wheel in self.kernel.priced():
-            if gait_key(S, wheel) not in self.kernel.excluded:
-                yield self._plan(S, wheel)
+        for gait in self.kernel.priced():
+            if gait.key not in self.kernel.excluded:
+                yield self._plan(gait)
 
-    def _plan(self, S: np.ndarray, wheel: np.ndarray) -> Plan:
+    def _plan(self, gait: Gait) -> Plan:
         """Return the plan of a priced gait, with what is proven of all gaits."""
         kernel = self.kernel
-        found = kernel.leaf(S, wheel)
+        found = kernel.leaf(gait)
         fill(kernel.program, kernel.conic, found.y)
         meta = {
             "stage": "relaxed",
@@ -197,4 +197,4 @@ class Search:
             "solve_time": self._spent,
             "build_time": self.build_time,
         }
-        return plan_of(self.problem, read(kernel.program), S, wheel, meta)
+        return plan_of(self.problem, read(kernel.program), gait, meta)

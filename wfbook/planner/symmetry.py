@@ -4,7 +4,9 @@ from typing import Any
 
 import numpy as np
 
+from wfbook.planner.gait import Gait
 from wfbook.planner.problem import Problem
+from wfbook.terrain import Region
 
 MIRROR = (1, 0, 3, 2)
 """The leg on the other side: FL and FR, RL and RR."""
@@ -20,19 +22,44 @@ def mirror_symmetric(problem: Problem) -> bool:
     contacts = np.abs(mirrored[:, 0] - problem.start_contacts[:, 0]).max() < tolerance
     contacts &= np.abs(2 * axis - mirrored[:, 1] - problem.start_contacts[:, 1]).max() < tolerance
     kinds = list(problem.start_end_effectors)
-    A, b = problem.region.halfspaces
-    sides = {(round(r[0], 9), round(r[1], 9), round(c, 9)) for r, c in zip(A, b, strict=True)}
-    images = {
-        (round(r[0], 9), round(-r[1], 9), round(c - 2 * axis * r[1], 9)) for r, c in zip(A, b, strict=True)
-    }
     patterns = {frozenset(p) for p in problem.patterns}
     return bool(
         contacts
         and abs(problem.goal[1] - axis) < tolerance
         and kinds == [kinds[m] for m in MIRROR]
-        and sides == images
+        and mirrored_regions(problem) is not None
         and patterns == {frozenset(MIRROR[leg] for leg in p) for p in patterns}
     )
+
+
+def mirrored_regions(problem: Problem) -> np.ndarray | None:
+    """Return the index of each region's mirror image, ``(R,)``; None if the terrain is not symmetric."""
+    axis, found = problem.start[1], []
+    keys = [_numbers(region, region.vertices) for region in problem.terrain.regions]
+    groups: dict[int, int] = {}
+    for r, region in enumerate(problem.terrain.regions):
+        image = region.vertices * [1, -1, 1] + [0, 2 * axis, 0]
+        matches = [i for i, key in enumerate(keys) if key == _numbers(region, image)]
+        if not matches:
+            return None
+        found.append(matches[0])
+        group = problem.ground.group_of[[r, matches[0]]]
+        if groups.setdefault(group[0], group[1]) != group[1]:
+            return None
+    return np.array(found) if len(set(found)) == len(found) else None
+
+
+def _numbers(region: Region, vertices: np.ndarray) -> tuple:
+    """Return what two equal regions have in common, whatever corner they begin with."""
+    corners = sorted(map(tuple, (np.round(vertices, 9) + 0.0).tolist()))
+    surface = (region.mu_foot, region.mu_wheel, region.mu_wheel_lateral, region.rolling_resistance)
+    return (*corners, *surface)
+
+
+def mirrored(problem: Problem, gait: Gait) -> Gait:
+    """Return a gait of a symmetric problem with left and right exchanged."""
+    swapped = [part[list(MIRROR)] for part in gait]
+    return Gait(*swapped[:2], mirrored_regions(problem)[swapped[2]])
 
 
 def mirror_row(S: Any) -> Any:

@@ -6,9 +6,12 @@ What makes it tight, against the paper's big-M of the same feasible set:
   the stationary foot, so eqs 6 and 19 need no implication.
 * A wheel's roll is a binary times a bounded displacement: McCormick's four inequalities, which are
   exact at binaries and the convex hull between them.
-* Where a leg stands and what it stands on is a path through a small graph, slot by slot (eqs 16–17),
-  whose flow constraints have integral corners.
-* Force is split by end effector, each part zero unless its leg stands on that (eqs 7, 27–29).
+* Where a leg stands and what it stands on is a path through a small graph (:mod:`.contacts`), whose flow
+  constraints have integral corners.
+* Where a slot ends, each contact point is a sum of one share for each region, zero unless the contact
+  is there: the convex hull of the regions instead of eqs 24–25.
+* Force is split by end effector and kind of surface, each part zero unless its leg stands on that
+  (eqs 7, 27–29).
 * The centroid is written relative to the centre of mass, where the reach box bounds every term, and
   eq. 15 is split by the number of swinging legs.
 """
@@ -19,6 +22,8 @@ import cvxpy as cp
 import numpy as np
 
 from wfbook.friction import friction_pyramid, rolling_friction
+from wfbook.planner.contacts import Contacts
+from wfbook.planner.ground import Places
 from wfbook.planner.problem import Problem
 from wfbook.planner.program import Grid, Program, common, within
 
@@ -30,90 +35,20 @@ def build(problem: Problem) -> Program:
         problem: what is asked.
 
     Returns:
-        The program. It is the mixed-integer one when ``S`` and ``wheel`` are required to be integers.
+        The program. It is the mixed-integer one when ``program.discrete`` is required to be integers.
     """
-    J, L = problem.slots, problem.legs
-    kinds = problem.end_effectors
-    stance = {e: cp.Variable((L, J), name=f"stance_{e}") for e in kinds}
-    landing = {e: cp.Variable((L, J), name=f"landing_{e}") for e in kinds}
-    S = sum(landing.values())
-    wheel = stance["wheel"] + landing["wheel"] if problem.wheels else np.zeros((L, J))
-    grid = Grid.of(problem)
-    force, friction, forces = _forces(problem, stance, grid)
-    program = common(problem, S, wheel, force, friction, per_leg=False)
-    program.add("friction", *forces)
-    program.add("modes", *flow(problem, S, stance, landing))
-    chosen = cp.Variable((len(problem.patterns), J), name="pattern")
-    sizes, hull = pattern_hull(problem, S, chosen)
-    program.add("patterns", *hull)
-    program.discrete = {"pattern": chosen, **{("stance", e): stance[e] for e in kinds}}
-    program.discrete |= {("landing", e): landing[e] for e in kinds}
-    _motion(program, grid, stance, landing)
-    _centroid(program, grid, sizes)
+    contacts, grid = Contacts.of(problem, inner_knots=True), Grid.of(problem)
+    force, friction, rows = _forces(contacts, grid)
+    program = common(problem, contacts.S, contacts.wheel, force, friction, per_leg=False)
+    program.add("friction", *rows)
+    program.add("modes", *contacts.rows)
+    program.discrete = contacts.discrete()
+    places = Places.of(problem, problem.ground)
+    _motion(program, contacts, grid)
+    _regions(program, contacts, places)
+    _heights(program, contacts, grid, places)
+    _centroid(program, contacts, grid)
     return program
-
-
-def assignment(problem: Problem, S: np.ndarray, wheel: np.ndarray) -> dict[Any, np.ndarray]:
-    """Return the values of all discrete variables that a swing and a dynamics matrix imply.
-
-    Args:
-        problem: what is asked.
-        S: ``(L, J)`` swing matrix.
-        wheel: ``(L, J)`` wheel's dynamics matrix.
-
-    Returns:
-        Values by the keys of ``Program.discrete``.
-
-    Raises:
-        KeyError: a slot's set of swinging legs is not an admissible pattern.
-    """
-    on = {"foot": 1 - wheel, "wheel": wheel}
-    values: dict[Any, np.ndarray] = {("stance", e): on[e] * (1 - S) for e in problem.end_effectors}
-    values |= {("landing", e): on[e] * S for e in problem.end_effectors}
-    index = {frozenset(p): i for i, p in enumerate(problem.patterns)}
-    rows = [index[frozenset(np.flatnonzero(S[:, j]).tolist())] for j in range(problem.slots)]
-    values["pattern"] = np.eye(len(problem.patterns))[:, rows]
-    return values
-
-
-def flow(problem: Problem, S: Any, stance: dict, landing: dict) -> list[Any]:
-    """State eqs 16 and 17 as a flow: a leg stands only on what it carried the slot before.
-
-    Args:
-        problem: what is asked.
-        S: swing matrix, ``(L, J)``.
-        stance: by end effector, ``(L, J)``: the leg stands on it.
-        landing: by end effector, ``(L, J)``: the leg swings and will land on it.
-    """
-    constraints = [sum(stance.values()) + S == 1]
-    constraints += [part >= 0 for part in (*stance.values(), *landing.values())]
-    for e in problem.end_effectors:
-        before = np.array([[float(name == e)] for name in problem.start_end_effectors])
-        constraints.append(stance[e][:, :1] <= before)
-        constraints.append(stance[e][:, 1:] <= stance[e][:, :-1] + landing[e][:, :-1])
-    if problem.stance_between_swings and problem.slots > 1:
-        constraints.append(S[:, 1:] + S[:, :-1] <= 1)
-    if problem.final_stance and problem.wheels:
-        constraints.append(cp.sum(stance["foot"][:, -1]) >= 1)
-    return constraints
-
-
-def pattern_hull(problem: Problem, S: Any, chosen: Any) -> tuple[Any, list[Any]]:
-    """Keep ``S[:, j]`` in the convex hull of the admissible patterns.
-
-    Args:
-        problem: what is asked.
-        S: swing matrix, ``(L, J)``.
-        chosen: ``(patterns, J)`` nonnegative variable, 1 for the pattern of each slot.
-
-    Returns:
-        ``(N, J)`` expression whose row ``n`` is 1 where ``n`` legs swing (the paper's auxiliary s of
-        eqs 13–14, with the missing ``s₀`` added), and the constraints.
-    """
-    members = np.array([[float(leg in p) for p in problem.patterns] for leg in range(problem.legs)])
-    sizes = np.array([len(p) for p in problem.patterns])
-    counted = np.array([sizes == n for n in range(sizes.max() + 1)], float) @ chosen
-    return counted, [chosen >= 0, members @ chosen == S, cp.sum(chosen, axis=0) == 1]
 
 
 def mccormick(binary: Any, factor: Any, low: Any, high: Any) -> tuple[Any, list[Any]]:
@@ -146,31 +81,78 @@ def centroid_bounds(problem: Problem, n: int, axis: int) -> tuple[float, float]:
     return min(lower[s].mean() for s in standing), max(upper[s].mean() for s in standing)
 
 
-def _forces(problem: Problem, stance: dict, grid: Grid) -> tuple[list[Any], list[Any], list[Any]]:
-    """State eqs 7 and 26–29 for forces split by end effector.
+def region_shares(contacts: Contacts, places: Places) -> tuple[dict[int, dict[int, Any]], list[Any]]:
+    """Split the contact points at slot ends by region, each share inside its own (Paper A, eqs 22–25).
+
+    Args:
+        contacts: whose occupancy scales the shares.
+        places: boxes of what is in reach.
+
+    Returns:
+        By region and axis (0 x, 1 y; only those that matter) the shares ``(L, J)``, zero where the region
+        is not occupied, and constraints.
+    """
+    ground = contacts.problem.ground
+    shares, rows = {}, []
+    for r in range(ground.count):
+        occupied, open_ = contacts.occupancy(r), places.reachable[r].astype(float)
+        if not open_.all():
+            rows.append(occupied <= open_)
+        share = shares[r] = {i: cp.Variable(occupied.shape) for i in places.axes}
+        for i, part in share.items():
+            rows.append(part >= cp.multiply(open_ * places.within[r, i], occupied))
+            rows.append(part <= cp.multiply(open_ * places.upto[r, i], occupied))
+        for a, b in places.edges(r):
+            rows.append(sum(a[i] * share[i] for i in share if a[i]) <= b * occupied)
+    return shares, rows
+
+
+def _forces(contacts: Contacts, grid: Grid) -> tuple[list[Any], list[Any], list[Any]]:
+    """State eqs 7 and 26–29 for forces split by end effector and surface.
 
     Returns:
         Contact force and rolling friction in body weights, components ``(K, L)``, and constraints.
     """
-    region, shape = problem.region, (problem.knots, problem.legs)
-    friction = {"foot": (region.mu_foot, region.mu_foot), "wheel": (region.mu_wheel, region.mu_wheel_lateral)}
+    problem = contacts.problem
+    shape = (problem.knots, problem.legs)
     constraints, total, rolling = [], [0, 0, 0], [np.zeros(shape) for _ in range(3)]
-    for e in problem.end_effectors:
-        n, b = (cp.Variable(shape, name=f"{axis}_{e}") for axis in "nb")
-        t = cp.Variable(shape, name=f"t_{e}") if friction[e][0] > 0 else np.zeros(shape)
-        sides = friction_pyramid(n, t, b, *friction[e])
-        constraints += [
-            side <= 0 for side in sides if isinstance(side, cp.Expression) and not side.is_constant()
-        ]
-        constraints.append(n <= problem.limits.force * (grid.spread @ stance[e].T))
-        total = [total[0] + t, total[1] + b, total[2] + n]
-        if e == "wheel" and region.rolling_resistance > 0:
-            rolling[0] = rolling_friction(n, region.rolling_resistance)
+    for s, surface in enumerate(problem.ground.surfaces):
+        for e in problem.end_effectors:
+            mu_t, mu_b = surface.friction[e]
+            n, b = (cp.Variable(shape, name=f"{axis}{s}_{e}") for axis in "nb")
+            t = cp.Variable(shape, name=f"t{s}_{e}") if mu_t > 0 else np.zeros(shape)
+            sides = friction_pyramid(n, t, b, mu_t, mu_b)
+            constraints += [
+                side <= 0 for side in sides if isinstance(side, cp.Expression) and not side.is_constant()
+            ]
+            constraints.append(n <= problem.limits.force * _loaded(contacts, grid, e, surface.regions))
+            for part, direction in zip((n, t, b), surface.basis, strict=True):
+                total = [c + d * part if d else c for c, d in zip(total, direction, strict=True)]
+            if e == "wheel" and surface.rolling_resistance > 0:
+                drag = rolling_friction(n, surface.rolling_resistance)
+                along = surface.basis[1]
+                rolling = [c + d * drag if d else c for c, d in zip(rolling, along, strict=True)]
     return total, rolling, constraints
 
 
-def _motion(program: Program, grid: Grid, stance: dict, landing: dict) -> None:
-    """State eqs 2–6 and 19–22: steps, rolls and regions."""
+def _loaded(contacts: Contacts, grid: Grid, end_effector: str, regions: tuple[int, ...]) -> Any:
+    """Return at which intervals a leg may push with an end effector on some regions, ``(K, L)``."""
+    if end_effector == "foot":
+        return grid.spread @ sum(contacts.foot_stance[r] for r in regions).T
+    ground, total = contacts.problem.ground, 0
+    for g, members in enumerate(ground.groups):
+        if set(members) <= set(regions):
+            total = total + grid.spread @ contacts.wheel_stance[g].T
+            continue
+        for at, here in enumerate((*contacts.passing, contacts.zone)):
+            part = [here[r] for r in members if r in regions]
+            if part:
+                total = total + (grid.spread * (grid.age == at + 1)[:, None]) @ sum(part).T
+    return total
+
+
+def _motion(program: Program, contacts: Contacts, grid: Grid) -> None:
+    """State eqs 2–6 and 19–21: steps and rolls, horizontally."""
     problem, p, x, v = program.problem, program.p, program.x, program.v
     J, K, L, rho = problem.slots, problem.knots, problem.legs, problem.knots_per_slot
     step = [cp.Variable((L, J), name=f"step{i}") for i in range(2)]
@@ -179,31 +161,96 @@ def _motion(program: Program, grid: Grid, stance: dict, landing: dict) -> None:
     moved = [grid.step @ step[i].T for i in range(2)]
     if problem.wheels:
         low, high = -problem.limits.speed[1], problem.limits.speed[0]
-        before = np.array([[float(name == "wheel")] for name in problem.start_end_effectors])
-        carried = cp.hstack([before, program.wheel[:, :-1]])
         rows, columns = np.ones((L, 1)), np.ones((1, L))
         lift, exact = mccormick(
-            carried - stance["wheel"], rows @ cp.reshape(v[0][0:K:rho], (1, J), order="C"), low, high
+            contacts.carried() - contacts.rolling,
+            rows @ cp.reshape(v[0][0:K:rho], (1, J), order="C"),
+            low,
+            high,
         )
         land, exact_land = mccormick(
-            landing["wheel"], rows @ cp.reshape(v[0][rho : K + 1 : rho], (1, J), order="C"), low, high
+            contacts.landing_wheel(),
+            rows @ cp.reshape(v[0][rho : K + 1 : rho], (1, J), order="C"),
+            low,
+            high,
         )
         age = problem.dt * grid.age[:, None]
         travelled = cp.reshape(x[0][1:] - grid.begin @ x[0], (K, 1), order="C") @ columns
-        roll, exact_roll = mccormick(grid.spread @ stance["wheel"].T, travelled, low * age, high * age)
+        roll, exact_roll = mccormick(grid.spread @ contacts.rolling.T, travelled, low * age, high * age)
         program.add("motion", *exact, *exact_land, *exact_roll)
         moved[0] = moved[0] + grid.lift @ lift.T + grid.land @ land.T + roll
     program.add("motion", *(p[i][1:] == grid.begin @ p[i] + moved[i] for i in range(2)))
-    program.add("motion", p[2] == problem.ground + problem.robot.swing_height * (grid.apex @ program.S.T))
-    ends = slice(0, K + 1, rho)
-    A, b = problem.region.halfspaces
-    for row, limit in zip(A, b, strict=True):
-        program.add("regions", row[0] * p[0][ends] + row[1] * p[1][ends] <= limit)
 
 
-def _centroid(program: Program, grid: Grid, sizes: Any) -> None:
+def _regions(program: Program, contacts: Contacts, places: Places) -> None:
+    """State eqs 22–25: contacts lie inside regions where slots end, and rolling wheels always."""
+    problem, ground, p = program.problem, program.problem.ground, program.p
+    rho = problem.knots_per_slot
+    shares, rows = region_shares(contacts, places)
+    ends = [p[i][rho::rho].T for i in range(2)]
+    program.add("regions", *rows)
+    program.add("regions", *(sum(s[i] for s in shares.values()) == ends[i] for i in places.axes))
+    if ground.level is None:
+        heights = 0
+        for r, (*slopes, constant) in enumerate(ground.planes):
+            heights = heights + constant * contacts.occupancy(r)
+            heights = heights + sum(slopes[i] * shares[r][i] for i in places.axes if slopes[i])
+        program.add("regions", p[2][rho::rho].T == heights)
+    for at, here in enumerate(contacts.passing, start=1):
+        point = [p[i][at::rho].T for i in range(3)]
+        for r, inside in here.items():
+            program.add("regions", *_inside(point, r, inside, places, problem.robot.swing_height))
+
+
+def _inside(point: list[Any], region: int, inside: Any, places: Places, apex: float) -> list[Any]:
+    """State that a rolling wheel is on a region if ``inside`` is 1.
+
+    A big-M with the least M that reach allows: the wheel's place when the slot ends, where the hull is
+    exact, leaves the knots within the slot little freedom.
+    """
+    ground, rows = places.ground, []
+    outside = 1 - inside
+    for i in places.axes:
+        below = np.maximum(places.within[region, i] - places.low[i], 0.0)
+        above = np.maximum(places.high[i] - places.upto[region, i], 0.0)
+        rows.append(point[i] >= places.within[region, i] - cp.multiply(below, outside))
+        rows.append(point[i] <= places.upto[region, i] + cp.multiply(above, outside))
+    for a, b in places.edges(region):
+        most = sum(np.maximum(a[i] * places.low[i], a[i] * places.high[i]) for i in range(2))
+        over = np.maximum(most - b, 0.0)
+        rows.append(sum(a[i] * point[i] for i in range(2) if a[i]) <= b + cp.multiply(over, outside))
+    if ground.level is None:
+        slope_x, slope_y, constant = ground.planes[region]
+        off = point[2] - slope_x * point[0] - slope_y * point[1] - constant
+        least, most = ground.heights(region, places.low, places.high)
+        rows.append(off <= cp.multiply(places.highest + apex - least, outside))
+        rows.append(-off <= cp.multiply(most - places.lowest, outside))
+    return rows
+
+
+def _heights(program: Program, contacts: Contacts, grid: Grid, places: Places) -> None:
+    """State the vertical spline (eq. 5) and how contacts rise and fall while they roll."""
+    problem, z, S = program.problem, program.p[2], program.S
+    bump = problem.robot.swing_height * (grid.apex[1:] @ S.T)
+    if problem.ground.level is not None:
+        program.add("motion", z[1:] == problem.ground.level + bump)
+        return
+    most = float((places.highest - places.lowest).max())
+    climb = cp.Variable(S.shape, name="climb")
+    program.add("motion", *within(climb, most * S))
+    moved = grid.climb @ climb.T + bump
+    if problem.wheels and problem.ground.steepest > 0:
+        rolled = cp.Variable((problem.knots, problem.legs), name="rolled_height")
+        farthest = problem.ground.steepest * max(problem.limits.speed) * problem.dt * grid.age[:, None]
+        rolls = grid.spread @ contacts.rolling.T
+        program.add("motion", *within(rolled, cp.multiply(farthest, rolls)))
+        moved = moved + rolled
+    program.add("motion", z[1:] == grid.begin @ z + moved)
+
+
+def _centroid(program: Program, contacts: Contacts, grid: Grid) -> None:
     """State eqs 10–15 relative to the centre of mass, split by the number of swinging legs."""
-    problem = program.problem
+    problem, sizes = program.problem, contacts.sizes
     K, L = problem.knots, problem.legs
     swing = grid.spread @ program.S.T
     ones = np.ones((1, L))

@@ -9,7 +9,7 @@ import contextlib
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,6 +17,7 @@ import numpy as np
 from pyscipopt import SCIP_HEURTIMING, SCIP_PARAMSETTING, SCIP_RESULT, Branchrule, Conshdlr, Heur, Model
 from pyscipopt.scip import Relax
 
+from wfbook.planner.gait import Gait
 from wfbook.planner.gaits import improve
 from wfbook.planner.kernel import INTEGRAL, Kernel
 
@@ -49,14 +50,16 @@ class Tree:
         gap: relative gap at which the search ends.
         time_limit: in seconds, for the search.
         progress: called with a :class:`Progress` now and then.
-        best: cost, swing matrix and wheel's dynamics matrix of the incumbent.
+        first: gaits to try before others.
+        best: cost and gait of the incumbent.
     """
 
     kernel: Kernel
     gap: float
     time_limit: float
     progress: Callable[[Progress], None] | None = None
-    best: tuple[float, np.ndarray, np.ndarray] | None = None
+    first: Sequence[Gait] = ()
+    best: tuple[float, Gait] | None = None
     root_bound: float = -np.inf
     error: BaseException | None = None
     _begin: float = field(default_factory=time.perf_counter)
@@ -160,22 +163,22 @@ class Tree:
         upper = np.array([round(v.getUbLocal()) for v in self.variables])
         return lower, upper
 
-    def price(self, S: np.ndarray, wheel: np.ndarray) -> float:
+    def price(self, gait: Gait) -> float:
         """Return a gait's cost, and keep it if it is the best so far."""
-        value = self.kernel.leaf(S, wheel).value
+        value = self.kernel.price([gait], self.cutoff)[0]
         if value < self.incumbent:
-            self._keep(value, S, wheel)
+            self._keep(value, gait)
         return value
 
-    def _keep(self, value: float, S: np.ndarray, wheel: np.ndarray) -> None:
-        self.best = (value, S, wheel)
+    def _keep(self, value: float, gait: Gait) -> None:
+        self.best = (value, gait)
         self.report(force=True)
 
     def submit(self, heuristic: Heur | None = None) -> bool:
         """Hand the incumbent to SCIP."""
-        value, S, wheel = self.best
+        value, gait = self.best
         solution = self.model.createSol(heuristic)
-        for variable, number in zip(self.variables, self.kernel.boxes.vector(S, wheel), strict=True):
+        for variable, number in zip(self.variables, self.kernel.boxes.vector(gait), strict=True):
             self.model.setSolVal(solution, variable, float(number))
         self.model.setSolVal(solution, self.cost, value)
         return self.model.trySol(solution, printreason=False, checkbounds=False)
@@ -235,6 +238,7 @@ class _Split(Branchrule):
 
     def __init__(self, tree: Tree):
         self.tree = tree
+        self._completed: set[bytes] = set()
 
     def branchexecps(self, allowaddcons: bool) -> dict[str, Any]:
         """Make children of the focus node."""
@@ -251,15 +255,14 @@ class _Split(Branchrule):
             return {"result": SCIP_RESULT.CUTOFF}
         found = kernel.bound(*box)
         if found.status == "solved":
-            z = kernel.values(found)
-            binaries = z[np.concatenate([kernel.boxes.layout.S.ravel(), kernel.boxes.layout.wheel.ravel()])]
-            if np.abs(binaries - np.rint(binaries)).max() <= INTEGRAL:
-                before = tree.incumbent
-                tree.price(*kernel.boxes.gait(z))
-                if tree.incumbent < before:
-                    tree.submit()
+            before = tree.incumbent
+            if self._placed(box):
+                return {"result": SCIP_RESULT.CUTOFF}
+            self._round(kernel.values(found))
+            if tree.incumbent < before:
+                tree.submit()
         if (box[0] == box[1]).all():
-            tree.price(*kernel.boxes.gait(box[0]))
+            tree.price(kernel.boxes.gait(box[0]))
             return {"result": SCIP_RESULT.CUTOFF}
         children = kernel.split(*box, found, tree.cutoff)
         if not children:
@@ -278,6 +281,40 @@ class _Split(Branchrule):
         return {"result": SCIP_RESULT.BRANCHED}
 
 
+    def _placed(self, box: tuple[np.ndarray, np.ndarray]) -> bool:
+        """Tell whether a box is of no interest in which only regions are open; price what it rounds to."""
+        tree, kernel, layout = self.tree, self.tree.kernel, self.tree.kernel.boxes.layout
+        modes = np.concatenate([layout.S.ravel(), layout.wheel.ravel()])
+        if (box[0] == box[1]).all() or (box[0][modes] < box[1][modes]).any():
+            return False
+        found, gait = kernel.placed(*box)
+        if found.bound >= tree.cutoff:
+            kernel.pruned = min(kernel.pruned, found.bound)
+            return True
+        if gait is not None:
+            tree.price(gait)
+        return False
+
+    def _round(self, z: np.ndarray) -> None:
+        """Price the gait of a relaxation that is integral, at least in swings and wheels."""
+        tree, boxes = self.tree, self.tree.kernel.boxes
+        layout = boxes.layout
+
+        def integral(index: np.ndarray) -> bool:
+            return not index.size or np.abs(z[index] - np.rint(z[index])).max() <= INTEGRAL
+
+        if not (integral(layout.S) and integral(layout.wheel)):
+            return
+        gait: Gait | None = boxes.gait(z)
+        if not integral(layout.G):
+            if gait.modes in self._completed:
+                return
+            self._completed.add(gait.modes)
+            gait = tree.kernel.complete([gait.open()])[0]
+        if gait is not None and boxes.admissible(gait):
+            tree.price(gait)
+
+
 class _Price(Conshdlr):
     """Accepts a solution only at the cost of its gait, and closes nodes that hold a single gait."""
 
@@ -293,12 +330,11 @@ class _Price(Conshdlr):
     def _check(self, solution: Any) -> dict[str, Any]:
         tree = self.tree
         z = np.array([tree.model.getSolVal(solution, v) for v in tree.variables])
-        if np.abs(z - np.rint(z)).max() > INTEGRAL or not tree.kernel.boxes.admissible(
-            *tree.kernel.boxes.gait(z)
-        ):
+        gait = tree.kernel.boxes.gait(z)
+        if np.abs(z - np.rint(z)).max() > INTEGRAL or not tree.kernel.boxes.admissible(gait):
             return {"result": SCIP_RESULT.INFEASIBLE}
         cost = tree.model.getSolVal(solution, tree.cost)
-        right = cost >= tree.kernel.leaf(*tree.kernel.boxes.gait(z)).value - 1e-9
+        right = cost >= tree.kernel.leaf(gait).value - 1e-9
         return {"result": SCIP_RESULT.FEASIBLE if right else SCIP_RESULT.INFEASIBLE}
 
     def consenfolp(self, constraints, n_useful, infeasible) -> dict[str, Any]:
@@ -315,8 +351,9 @@ class _Price(Conshdlr):
         if (lower < upper).any():
             return {"result": SCIP_RESULT.INFEASIBLE}
         before = tree.incumbent
-        if tree.kernel.boxes.admissible(*tree.kernel.boxes.gait(lower)):
-            tree.price(*tree.kernel.boxes.gait(lower))
+        gait = tree.kernel.boxes.gait(lower)
+        if tree.kernel.boxes.admissible(gait):
+            tree.price(gait)
         if tree.incumbent < before:
             tree.submit()
         return {"result": SCIP_RESULT.CUTOFF}
@@ -339,15 +376,15 @@ class _Gaits(Heur):
 
     def _run(self) -> dict[str, Any]:
         tree, found = self.tree, False
-        if tree.best is not None and np.isfinite(tree.kernel.leaf(*tree.best[1:]).value):
+        if tree.best is not None and np.isfinite(tree.kernel.leaf(tree.best[1]).value):
             found = tree.submit(self)
 
         def late() -> bool:
             tree.report()
             return tree.error is not None or tree.elapsed > tree.time_limit
 
-        for value, S, wheel in improve(tree.kernel, late):
+        for value, gait in improve(tree.kernel, tree.first, late):
             if value < tree.incumbent:
-                tree._keep(value, S, wheel)
+                tree._keep(value, gait)
                 found |= tree.submit(self)
         return {"result": SCIP_RESULT.FOUNDSOL if found else SCIP_RESULT.DIDNOTFIND}
