@@ -132,7 +132,7 @@ def improve(
     for _ in range(_ROUNDS):
         candidates = [*first, *templates(problem)] if current is None else neighbours(problem, current)
         tried = [g for g in kernel.complete(ranked(candidates, best)[:_EXACT]) if g is not None]
-        costs = kernel.price(tried)
+        costs = kernel.price(tried, best)
         if not costs or min(costs) >= best or stop():
             return
         best, current = min(costs), tried[int(np.argmin(costs))]

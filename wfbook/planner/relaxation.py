@@ -20,6 +20,7 @@ import numpy as np
 
 from wfbook.centroidal import GRAVITY, midpoint_integration
 from wfbook.friction import friction_pyramid
+from wfbook.planner.bounds import MotionBounds
 from wfbook.planner.contacts import Contacts
 from wfbook.planner.ground import Places, Surface
 from wfbook.planner.problem import Problem
@@ -36,18 +37,28 @@ class Relaxation:
         cost: a lower bound of eq. 31.
         constraints: of the QP.
         contacts: its discrete variables.
+        x: of the centre of mass, ``(K+1,)``.
+        places: of the contacts when slots end, x and y, each ``(L, J+1)``.
     """
 
     cost: Any
     constraints: list[Any]
     contacts: Contacts
+    x: Any
+    places: list[Any]
 
 
-def build(problem: Problem) -> Relaxation:
-    """State the QP for a problem, with binaries relaxed to ``[0, 1]``."""
+def build(problem: Problem, bounds: MotionBounds) -> Relaxation:
+    """State the QP for a problem, with binaries relaxed to ``[0, 1]``.
+
+    Args:
+        problem: what is asked.
+        bounds: of the centre of mass; if they hold for plans below some cost only, so does the QP.
+    """
     J, K, rho, dt = problem.slots, problem.knots, problem.knots_per_slot, problem.dt
     w, robot, limits, ground = problem.weights, problem.robot, problem.limits, problem.ground
-    contacts = Contacts.of(problem, inner_knots=False)
+    places = Places.of(problem, bounds)
+    contacts = Contacts.of(problem, places, inner_knots=False)
     S = contacts.S
     constraints = list(contacts.rows)
     cost = w.swing * cp.sum(S @ np.arange(1, J + 1))
@@ -64,7 +75,6 @@ def build(problem: Problem) -> Relaxation:
     cost += w.goal * sum(cp.square(x[i][K] - problem.goal[i]) for i in range(2))
     cost += w.acceleration * sum(cp.sum_squares(a[i]) for i in range(3))
 
-    places = Places.of(problem, ground)
     shares, rows = region_shares(contacts, places)
     constraints += rows
     if ground.level is not None:
@@ -73,10 +83,11 @@ def build(problem: Problem) -> Relaxation:
     else:
         constraints += _reach_down(contacts, shares, x[2][rho::rho])
         cost += _best_heights(problem) @ cp.sum(contacts.sizes, axis=1)
-    for part, rows in (_forces(contacts, a), _levers(contacts, x, shares)):
+    ends = [cp.Variable((problem.legs, J + 1)) for _ in range(2)]
+    for part, rows in (_forces(contacts, a), _levers(contacts, x, ends, shares, bounds)):
         cost = cost + part
         constraints += rows
-    return Relaxation(cost, constraints, contacts)
+    return Relaxation(cost, constraints, contacts, x[0], ends)
 
 
 def _forces(contacts: Contacts, a: list[Any]) -> tuple[Any, list[Any]]:
@@ -150,10 +161,11 @@ def _on_surfaces(
     problem = contacts.problem
     most, total, drag, rows, wheels = problem.limits.force, [0, 0, 0], [0, 0, 0], [], 0
     for surface in problem.ground.surfaces:
-        for e in problem.end_effectors:
+        used = [r for r in surface.regions if r in contacts.regions]
+        for e in problem.end_effectors if used else ():
             n, t, b = (cp.Variable(problem.knots) for _ in range(3))
             rows += [side <= 0 for side in friction_pyramid(n, t, b, *surface.friction[e])]
-            rows.append(n <= most * (spread @ cp.sum(_carrying(contacts, e, surface), axis=0)))
+            rows.append(n <= most * (spread @ cp.sum(_carrying(contacts, e, used), axis=0)))
             for force, direction in zip((n, t, b), surface.basis, strict=True):
                 total = [c + d * force if d else c for c, d in zip(total, direction, strict=True)]
             if e == "wheel":
@@ -167,19 +179,19 @@ def _on_surfaces(
     return *total, rows
 
 
-def _carrying(contacts: Contacts, end_effector: str, surface: Surface) -> Any:
-    """Return an upper bound of which legs may push on a surface during a slot, ``(L, J)``.
+def _carrying(contacts: Contacts, end_effector: str, regions: list[int]) -> Any:
+    """Return an upper bound of which legs may push on some regions during a slot, ``(L, J)``.
 
     A wheel that crosses an edge pushes on both sides of it, and if it can pass a whole region within a
     slot, on what its ends do not show.
     """
     if end_effector == "foot":
-        return sum(contacts.foot_stance[r] for r in surface.regions)
+        return sum(contacts.foot_stance[r] for r in regions)
     problem, ground = contacts.problem, contacts.problem.ground
     farthest = max(problem.limits.speed) * problem.slot_duration
     total = 0
-    for g, members in enumerate(ground.groups):
-        inside = [r for r in members if r in surface.regions]
+    for g, members in contacts.groups.items():
+        inside = [r for r in members if r in regions]
         short = any(np.ptp(ground.regions[r].vertices[:, 0]) <= farthest for r in inside)
         if set(members) <= set(inside) or (inside and short):
             total = total + contacts.wheel_stance[g]
@@ -191,7 +203,8 @@ def _carrying(contacts: Contacts, end_effector: str, surface: Surface) -> Any:
 def _reach_down(contacts: Contacts, shares: dict, z: Any) -> list[Any]:
     """State eq. 30 vertically where slots end, on ground that is not one level plane."""
     problem, heights = contacts.problem, 0
-    for r, (*slopes, constant) in enumerate(problem.ground.planes):
+    for r in contacts.regions:
+        *slopes, constant = problem.ground.planes[r]
         heights = heights + constant * contacts.occupancy(r)
         heights = heights + sum(slopes[i] * part for i, part in shares[r].items() if slopes[i])
     lever = heights - np.ones((problem.legs, 1)) @ cp.reshape(z, (1, problem.slots), order="C")
@@ -217,7 +230,9 @@ def _best_heights(problem: Problem) -> np.ndarray:
     return (both * (raised - robot.height) ** 2).sum(axis=1)
 
 
-def _levers(contacts: Contacts, x: list[Any], shares: dict) -> tuple[Any, list[Any]]:
+def _levers(
+    contacts: Contacts, x: list[Any], places: list[Any], shares: dict, bounds: MotionBounds
+) -> tuple[Any, list[Any]]:
     """Bound the horizontal cost of levers and centroid; state eqs 19–22 and 30 at slot ends."""
     problem, S, sizes = contacts.problem, contacts.S, contacts.sizes
     J, K, L, rho = problem.slots, problem.knots, problem.legs, problem.knots_per_slot
@@ -229,7 +244,7 @@ def _levers(contacts: Contacts, x: list[Any], shares: dict) -> tuple[Any, list[A
     counts = L - np.arange(sizes.shape[0])
     cost, rows = 0, []
     for i in range(2):
-        place, step = cp.Variable((L, J + 1)), cp.Variable((L, J))
+        place, step = places[i], cp.Variable((L, J))
         rows += [place[:, 0] == problem.start_contacts[:, i], *within(step, limits.step[i] * S)]
         ends = x[i][0 : K + 1 : rho]
         during = cp.Variable(J)
@@ -240,15 +255,12 @@ def _levers(contacts: Contacts, x: list[Any], shares: dict) -> tuple[Any, list[A
             rolled, exact = mccormick(
                 contacts.rolling,
                 legs @ cp.reshape(ends[1:] - ends[:-1], (1, J), order="C"),
-                low * problem.slot_duration,
-                high * problem.slot_duration,
+                *bounds.travel,
             )
-            age = problem.dt * grid.age[:rho].mean()
             rolled_mean, exact_mean = mccormick(
                 contacts.rolling,
                 legs @ cp.reshape(during - ends[:-1], (1, J), order="C"),
-                low * age,
-                high * age,
+                *bounds.drift,
             )
             slack = cp.Variable((L, J))
             reach = problem.slot_duration * np.array([share[1], share[3]])

@@ -156,6 +156,7 @@ class Search:
         """Search with the time that is left (see :func:`solve`)."""
         kernel = self.kernel
         kernel.pruned = np.inf
+        kernel.relax()
         kernel.open()
         tree = Tree(kernel, self.gap, self._left, self.progress)
         status, bound, nodes = tree.run()
