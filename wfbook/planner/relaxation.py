@@ -3,8 +3,7 @@
 The search solves hundreds of relaxations, so they must be cheap. This one is a QP: rotation is
 dropped, but the squares that bound the torque (eq. 9) stay in the cost, for ``U⁺ + U⁻`` is never less
 than the sum of its squares. It knows feet only where slots begin and end, and forces only by their
-sum over legs. Where the ground is not one level plane,
-the height above it costs what it costs at best. Each shortening is a bound:
+sum over legs. Each shortening is a bound:
 
 * ``Σ_k r_k² ≥ ρ r̄²`` with the mean over a slot's knots, for levers and for the centroid;
 * ``Σ_l F_l² ≥ N²/m`` for ``m`` standing legs that carry ``N`` together, which is split by the number
@@ -81,8 +80,9 @@ def build(problem: Problem, bounds: MotionBounds) -> Relaxation:
         constraints += within(rise, robot.reach[2])
         cost += w.height * cp.sum_squares(rise) + _vertical_levers(problem, x[2], contacts.sizes)
     else:
-        constraints += _reach_down(contacts, shares, x[2][rho::rho])
-        cost += _best_heights(problem) @ cp.sum(contacts.sizes, axis=1)
+        part, rows = _heights(contacts, shares, x[2])
+        cost += part
+        constraints += rows
     ends = [cp.Variable((problem.legs, J + 1)) for _ in range(2)]
     for part, rows in (_forces(contacts, a), _levers(contacts, x, ends, shares, bounds)):
         cost = cost + part
@@ -200,34 +200,48 @@ def _carrying(contacts: Contacts, end_effector: str, regions: list[int]) -> Any:
     return total
 
 
-def _reach_down(contacts: Contacts, shares: dict, z: Any) -> list[Any]:
-    """State eq. 30 vertically where slots end, on ground that is not one level plane."""
-    problem, heights = contacts.problem, 0
+def _heights(contacts: Contacts, shares: dict, z: Any) -> tuple[Any, list[Any]]:
+    """Bound the cost of heights on ground that is not one level plane; state eq. 30 vertically at slot ends.
+
+    The mean height of the ground under the legs follows the splines between slot ends (eq. 5), but for
+    legs that roll, which are given what slopes and speed allow. ``Σ_l r_z² ≥ L mean²``.
+
+    Returns:
+        The cost, and constraints.
+    """
+    problem, w, robot, heights = contacts.problem, contacts.problem.weights, contacts.problem.robot, 0
+    J, K, L, rho, grid = problem.slots, problem.knots, problem.legs, problem.knots_per_slot, Grid.of(problem)
     for r in contacts.regions:
         *slopes, constant = problem.ground.planes[r]
         heights = heights + constant * contacts.occupancy(r)
         heights = heights + sum(slopes[i] * part for i, part in shares[r].items() if slopes[i])
-    lever = heights - np.ones((problem.legs, 1)) @ cp.reshape(z, (1, problem.slots), order="C")
-    low, high = problem.robot.reach_lower[0, 2], problem.robot.reach_upper[0, 2]
-    return [lever >= low, lever <= high]
+    lever = heights - np.ones((L, 1)) @ cp.reshape(z[rho::rho], (1, J), order="C")
+    rows = [lever >= robot.reach_lower[0, 2], lever <= robot.reach_upper[0, 2]]
+
+    # The clearance is the height above the mean of the ground, less the nominal one.
+    ground, clearance = cp.Variable(J + 1), cp.Variable(K + 1)
+    rows += [ground[0] == problem.start_heights.mean(), ground[1:] == cp.sum(heights, axis=0) / L]
+    between = grid.spread @ np.eye(J, J + 1) + grid.climb @ (np.eye(J, J + 1, 1) - np.eye(J, J + 1))
+    above = z[1:] - robot.height - between @ ground
+    if problem.wheels and problem.ground.steepest > 0:
+        rolled = cp.Variable(K)
+        inner = grid.age < rho
+        farthest = problem.ground.steepest * max(problem.limits.speed) * problem.slot_duration / L * inner
+        rows += within(rolled, cp.multiply(farthest, grid.spread @ cp.sum(contacts.rolling, axis=0)))
+        above = above + rolled
+    rows += [clearance[0] == 0, clearance[1:] == above]
+    bump, n = _bumps(problem), np.arange(contacts.sizes.shape[0])
+    swinging = grid.spread @ (contacts.sizes.T @ n)
+    middle = 0.5 * (clearance[1:] + clearance[:-1]) + robot.height
+    levers = cp.sum_squares(np.sqrt(L) * middle - cp.multiply(bump, swinging) / np.sqrt(L))
+    return w.height * cp.sum_squares(clearance) + 4 * w.bounds * levers, rows
 
 
-def _best_heights(problem: Problem) -> np.ndarray:
-    """Return the least that height and vertical levers cost a slot in which n legs swing, ``(N,)``.
-
-    The mean over legs of the vertical lever at mid-interval is ``h n/L − m`` for a height m above the
-    ground; ``Σ_l r² ≥ L mean²``, and the height term of eq. 31 is at least ``Σ_k (m_k − h₀)²`` over
-    mid-intervals, for the first of its knots costs nothing.
-    """
-    L, rho, w, robot = problem.legs, problem.knots_per_slot, problem.weights, problem.robot
-    profile = robot.swing_height * septic_basis(np.arange(rho + 1) / rho)[:, 2]
-    bump = 0.5 * (profile[1:] + profile[:-1])
-    n = np.arange(max(map(len, problem.patterns)) + 1)
-    raised = np.outer(n, bump) / L
-    levers = 4 * w.bounds * L
-    # The minimum over m of height (m − h₀)² + levers (raised − m)².
-    both = w.height * levers / (w.height + levers)
-    return (both * (raised - robot.height) ** 2).sum(axis=1)
+def _bumps(problem: Problem) -> np.ndarray:
+    """Return the height of a swing at mid-interval, ``(K,)``."""
+    rho = problem.knots_per_slot
+    profile = problem.robot.swing_height * septic_basis(np.arange(rho + 1) / rho)[:, 2]
+    return np.tile(0.5 * (profile[1:] + profile[:-1]), problem.slots)
 
 
 def _levers(
@@ -308,9 +322,7 @@ def _vertical_levers(problem: Problem, z: Any, sizes: Any) -> Any:
     With ``h`` the swing's height at mid-interval, ``Σ_l (h S_l − z)² = (2 z − h T/2)² + h² (T − T²/4)``
     for four legs, ``T = Σ_l S_l``; and ``T² = Σ_n n² s_n``.
     """
-    J, L, rho = problem.slots, problem.legs, problem.knots_per_slot
-    profile = problem.robot.swing_height * septic_basis(np.arange(rho + 1) / rho)[:, 2]
-    h = np.tile(0.5 * (profile[1:] + profile[:-1]), J)
+    L, h = problem.legs, _bumps(problem)
     n = np.arange(sizes.shape[0])
     spread = Grid.of(problem).spread
     swinging, square = spread @ (sizes.T @ n), spread @ (sizes.T @ n**2)
