@@ -124,7 +124,9 @@ def improve(
         for i in range(0, len(fresh), _BATCH):
             if stop():
                 break
-            bounds += kernel.gait_bounds(fresh[i : i + _BATCH])
+            # Only the best few are wanted.
+            worth = min(below, sorted(bounds)[_EXACT - 1] if len(bounds) >= _EXACT else np.inf)
+            bounds += kernel.gait_bounds(fresh[i : i + _BATCH], worth)
         order = sorted(range(len(bounds)), key=lambda i: (bounds[i], i))
         return [fresh[i] for i in order if bounds[i] < below]
 

@@ -22,7 +22,7 @@ from wfbook.planner.ground import Places
 from wfbook.planner.presolve import solve_fixed
 from wfbook.planner.problem import Problem
 from wfbook.planner.program import Program
-from wfbook.planner.symmetry import mirror_row, mirror_symmetric
+from wfbook.planner.symmetry import MIRROR, mirror_row, mirror_symmetric
 from wfbook.planner.worker import Worker, available
 
 INTEGRAL = 1e-5
@@ -67,6 +67,7 @@ class Kernel:
         self._crossings = Crossings(self.program, self.conic)
         self._leaves: dict[bytes, Solution] = {}
         self._mirror = cp.Variable()
+        self._symmetric = mirror_symmetric(problem)
         self._worker: Worker | None = None
         self._shares = False
         self._bound_within(self._anywhere)
@@ -109,11 +110,11 @@ class Kernel:
         """Narrow the motion to that of plans cheaper than a cutoff; from then on bounds hold for those only.
 
         Args:
-            cutoff: of the cost.
+            cutoff: of the cost. On a single region it narrows too little to be worth a new program.
             stop: asked now and then; once true, what is not narrowed yet stays as it is.
         """
         root = self.boxes.root()
-        if root is None or not (self.problem.wheels or self.problem.ground.count > 1):
+        if root is None or self.problem.ground.count == 1:
             return
         base = self.bound(*root).bound
         n, rho = self._qp_conic.A.shape[1], self.problem.knots_per_slot
@@ -149,7 +150,7 @@ class Kernel:
     def _symmetry_broken(self) -> Conic:
         """Return the QP with one of each pair of mirror images cut off, where the problem has them."""
         conic = self._qp_conic
-        if not mirror_symmetric(self.problem):
+        if not self._symmetric:
             return conic
         n = conic.A.shape[1]
         row = sparse.csc_matrix(([-1.0], ([0], [int(conic.columns(self._mirror))])), shape=(1, n))
@@ -250,7 +251,7 @@ class Kernel:
         self.leaves += 1
         self._leaves[gait.key] = found
         if found.status == "failed":
-            self.pruned = min(self.pruned, self._gait_bound(gait))
+            self.pruned = min(self.pruned, self._gait_qp(gait).bound)
         elif found.status != "infeasible":
             self.pruned = min(self.pruned, found.bound)
 
@@ -292,13 +293,22 @@ class Kernel:
         feasible = [(found.value, key) for key, found in self._leaves.items() if found.status == "solved"]
         return [Gait.from_key(key, self.problem.legs) for _, key in sorted(feasible)]
 
-    def gait_bounds(self, gaits: list[Gait]) -> list[float]:
-        """Return the QP's lower bounds of the costs of gaits, whose regions may be open."""
-        self.qps += len(gaits)
-        return self._shared(self._gait_bound, [(gait,) for gait in gaits])
+    def gait_bounds(self, gaits: list[Gait], cutoff: float = np.inf) -> list[float]:
+        """Return the relaxation's lower bounds of the costs of gaits, whose regions may be open.
 
-    def _gait_bound(self, gait: Gait) -> float:
-        return self._gait_qp(gait).bound
+        Args:
+            gaits: none of them impossible (see :meth:`.boxes.Boxes.of_modes`).
+            cutoff: a bound may be no better than this.
+        """
+        self.qps += len(gaits)
+        boxes = [self.boxes.of_modes(self._kept(gait)) for gait in gaits]
+        return [found.bound for found in self._shared(self._solve, [(*box, cutoff) for box in boxes])]
+
+    def _kept(self, gait: Gait) -> Gait:
+        """Return the gait or its mirror image, whichever the relaxation keeps."""
+        if self._symmetric and mirror_row(gait.S) < 0:
+            return Gait(*(part[list(MIRROR)] for part in gait.open()))
+        return gait
 
     def _gait_qp(self, gait: Gait) -> Solution:
         assigned = assignment(self.problem, gait, self._qp_keys)
