@@ -72,7 +72,7 @@ class Boxes:
         upper[layout.T] = L * np.arange(1, J + 1)
         if self.problem.final_stance:
             upper[layout.S[:, -1]] = 0
-        if not self._reachable.any(axis=0).all() or (self.problem.start_regions < 0).any():
+        if not self._reachable.any(axis=0).all() or not self.problem.start_in_reach:
             return None
         first = self._reachable.argmax(axis=0)
         last = len(self._reachable) - 1 - self._reachable[::-1].argmax(axis=0)

@@ -114,9 +114,9 @@ class GroundMap:
 
 def _plane(region: Region) -> tuple[float, float, float]:
     n, origin = region.normal, region.vertices.mean(axis=0)
-    a, b = -n[0] / n[2], -n[1] / n[2]
-    # Adding 0.0 turns −0.0 into 0.0, which prints and compares better.
-    return a + 0.0, b + 0.0, float(origin[2] - a * origin[0] - b * origin[1]) + 0.0
+    # Rounding errors as coefficients would look like slopes to a solver's presolve.
+    a, b = (0.0 if abs(part) < _SAME else -part / n[2] for part in n[:2])
+    return a, b, float(origin[2] - a * origin[0] - b * origin[1])
 
 
 def _surface(regions: tuple[Region, ...], members: tuple[int, ...]) -> Surface:
@@ -126,6 +126,7 @@ def _surface(regions: tuple[Region, ...], members: tuple[int, ...]) -> Surface:
         "wheel": (region.mu_wheel, region.mu_wheel_lateral),
     }
     basis = np.array([region.normal, region.tangent, region.binormal])
+    basis[np.abs(basis) < _SAME] = 0.0
     return Surface(members, basis, friction, region.rolling_resistance)
 
 

@@ -193,3 +193,14 @@ class Problem:
     def start_height(self) -> float:
         """Height of the centre of mass at time 0: the nominal one above the mean of the contacts."""
         return float(self.start_heights.mean()) + self.robot.height
+
+    @property
+    def start_in_reach(self) -> bool:
+        """Whether every leg has ground under it at time 0, within its reach box (eq. 30)."""
+        if (self.start_regions < 0).any():
+            return False
+        contacts = np.column_stack([self.start_contacts, self.start_heights])
+        lever = contacts - [*self.start, self.start_height]
+        robot, tolerance = self.robot, 1e-9
+        above = (lever >= robot.reach_lower - tolerance).all()
+        return bool(above and (lever <= robot.reach_upper + tolerance).all())
