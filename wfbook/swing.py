@@ -29,7 +29,8 @@ def _coefficients(apex: bool) -> np.ndarray:
     G = np.array(
         [[poly.polyval(s, poly.polyder(np.eye(n)[i], order)) for i in range(n)] for s, order in conditions]
     )
-    return np.linalg.inv(G)
+    # All are whole numbers or halves; rounded to that, the ends are met exactly and not to 1e-13.
+    return np.rint(2.0 * np.linalg.inv(G)) / 2.0
 
 
 def quintic_basis(phase: np.ndarray, derivative: int = 0) -> np.ndarray:

@@ -3,10 +3,15 @@
 Kept for teaching and for the benchmark. It has the same feasible plans as :mod:`.tight`, but between
 the binaries its constraints say nearly nothing: at ``S = ½`` a leg may be anywhere and push at the
 same time, so the bound of its relaxation is weak and the search long.
+
+Its binaries are the swing matrix ``S[l, j]``, the dynamics matrix ``D[l, j, r, e]``, for each region η of
+a group that wheels roll through the ``z_η`` of eqs 24 and 25, by knot, and the ``s_n`` of eq. 13. Where
+what eq. 18 implies is the same for every region, it is implied by the sum of D over regions.
 """
 
 import time
 import warnings
+from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any
 
@@ -16,9 +21,56 @@ import numpy as np
 from wfbook.friction import friction_pyramid, rolling_friction
 from wfbook.planner.explain import InfeasibleError, NoPlanError, conflicting_groups
 from wfbook.planner.extract import plan_of, read
+from wfbook.planner.gait import Gait
+from wfbook.planner.ground import Places, Surface
 from wfbook.planner.plan import Plan
 from wfbook.planner.problem import Problem
-from wfbook.planner.program import Grid, Program, common
+from wfbook.planner.program import Grid, Program, common, within
+
+
+@dataclass
+class Dynamics:
+    """The dynamics matrix and the union of regions that a wheel may roll through.
+
+    Attributes:
+        problem: what is asked.
+        S: swing matrix, ``(L, J)``.
+        D: by region and end effector, ``(L, J)``; a wheel's stays where it touched down.
+        z: by region of a group of several, ``(K, L)``: 0 where a wheel is on that region at knot k + 1.
+    """
+
+    problem: Problem
+    S: Any
+    D: dict[tuple[int, str], Any] = field(init=False)
+    z: dict[int, Any] = field(init=False)
+
+    def __post_init__(self):
+        problem, ground = self.problem, self.problem.ground
+        L, J, K = problem.legs, problem.slots, problem.knots
+        kinds = [(r, e) for r in range(ground.count) for e in problem.end_effectors]
+        self.D = {(r, e): cp.Variable((L, J), boolean=True, name=f"D{r}_{e}") for r, e in kinds}
+        shared = [r for members in ground.groups if len(members) > 1 for r in members]
+        self.z = {r: cp.Variable((K, L), boolean=True, name=f"z{r}") for r in shared if problem.wheels}
+
+    def carrying(self, end_effector: str) -> Any:
+        """Return which legs carry, or will land on, an end effector, ``(L, J)``."""
+        parts = [D for (_, e), D in self.D.items() if e == end_effector]
+        return sum(parts) if parts else np.zeros(self.S.shape)
+
+    def group(self, region: int) -> Any:
+        """Return whose wheels may be on a region: those that touched down in its group, ``(L, J)``."""
+        members = self.problem.ground.groups[self.problem.ground.group_of[region]]
+        return sum(self.D[r, "wheel"] for r in members)
+
+    def off(self, region: int) -> Any:
+        """Return ``z``, ``(K, L)``; a region alone in its group is where the wheel is all the time."""
+        return self.z.get(region, np.zeros((self.problem.knots, self.problem.legs)))
+
+    def before(self, region: int, end_effector: str) -> Any:
+        """Return D of the slot before, ``(L, J)``, in the first slot that of the start."""
+        start = np.array(self.problem.start_end_effectors) == end_effector
+        start &= self.problem.start_regions == region
+        return cp.hstack([start.astype(float)[:, None], self.D[region, end_effector][:, :-1]])
 
 
 def build(problem: Problem) -> Program:
@@ -28,23 +80,23 @@ def build(problem: Problem) -> Program:
         problem: what is asked.
 
     Returns:
-        The program; ``S`` and ``wheel`` are boolean variables (``wheel`` zeros where none is allowed).
+        The program. Its ``discrete`` holds ``"S"``, ``("D", r, e)``, ``("z", r)`` and ``"s"``.
     """
-    L, J, K = problem.legs, problem.slots, problem.knots
-    S = cp.Variable((L, J), boolean=True, name="S")
-    wheel = cp.Variable((L, J), boolean=True, name="D_wheel") if problem.wheels else np.zeros((L, J))
-    force = [cp.Variable((K, L), name=f"F{i}") for i in range(3)]
-    resists = problem.wheels and problem.region.rolling_resistance > 0
-    friction = [
-        cp.Variable((K, L), name="f0") if resists else np.zeros((K, L)),
-        np.zeros((K, L)),
-        np.zeros((K, L)),
-    ]
-    program = common(problem, S, wheel, force, friction, per_leg=True)
+    S = cp.Variable((problem.legs, problem.slots), boolean=True, name="S")
+    dynamics, shape = Dynamics(problem, S), (problem.knots, problem.legs)
+    force = [cp.Variable(shape, name=f"F{i}") for i in range(3)]
+    regions = problem.ground.regions if problem.wheels else ()
+    resisted = np.any([r.tangent * r.rolling_resistance for r in regions] or [np.zeros(3)], axis=0)
+    friction = [cp.Variable(shape, name=f"f{i}") if resisted[i] else np.zeros(shape) for i in range(3)]
+    program = common(problem, S, dynamics.carrying("wheel"), force, friction, per_leg=True)
     grid = Grid.of(problem)
-    _gait(program)
-    _motion(program, grid)
-    _forces(program, grid)
+    program.discrete = {"S": S} | {("D", *key): D for key, D in dynamics.D.items()}
+    program.discrete |= {("z", r): z for r, z in dynamics.z.items()}
+    _gait(program, dynamics)
+    _union(program, dynamics)
+    _motion(program, dynamics, grid)
+    _regions(program, dynamics, grid)
+    _forces(program, dynamics, grid)
     _centroid(program, grid)
     return program
 
@@ -57,12 +109,17 @@ def implies(condition: Any, expression: Any, big: Any) -> list[Any]:
         expression: of the same shape.
         big: M, a bound of ``|expression|``.
     """
-    return [expression <= cp.multiply(big, 1 - condition), -expression <= cp.multiply(big, 1 - condition)]
+    return [side for sign in (1, -1) for side in implies_below(condition, sign * expression, big)]
 
 
-def _gait(program: Program) -> None:
+def implies_below(condition: Any, expression: Any, big: Any) -> list[Any]:
+    """State ``condition = 1 ⟹ expression ≤ 0`` in big-M format; M is a bound of the expression."""
+    return [expression <= cp.multiply(big, 1 - condition)]
+
+
+def _gait(program: Program, dynamics: Dynamics) -> None:
     """State eqs 13, 14, 16, 17 and which legs may swing together and when."""
-    problem, S, wheel = program.problem, program.S, program.wheel
+    problem, S = program.problem, program.S
     admissible = {frozenset(p) for p in problem.patterns}
     for size in range(1, problem.legs + 1):
         for legs in combinations(range(problem.legs), size):
@@ -72,36 +129,59 @@ def _gait(program: Program) -> None:
                 program.add("patterns", left <= size - 1)
     if problem.stance_between_swings and problem.slots > 1:
         program.add("modes", S[:, 1:] + S[:, :-1] <= 1)
-    if problem.wheels:
-        start = np.array([[float(e == "wheel")] for e in problem.start_end_effectors])
-        change = wheel - cp.hstack([start, wheel[:, :-1]])
-        program.add("modes", change <= S, -change <= S)
-        if problem.final_stance:
-            program.add("modes", cp.sum(wheel[:, -1]) <= problem.legs - 1)
+    for key, D in dynamics.D.items():
+        program.add("modes", *within(D - dynamics.before(*key), S))
+    program.add("modes", sum(dynamics.D.values()) == 1)
+    if problem.final_stance and problem.wheels:
+        program.add("modes", cp.sum(dynamics.carrying("foot")[:, -1]) >= 1)
 
 
-def _motion(program: Program, grid: Grid) -> None:
-    """State eqs 2–6 and 19–22: which knots follow the spline, stay, or roll."""
+def _union(program: Program, dynamics: Dynamics) -> None:
+    """State eq. 25, and that a wheel passes its regions in one direction within a slot.
+
+    Equation 25 is an equality here, for the force at a knot needs one region; a wheel that touches down
+    does so where D says.
+    """
+    problem, rho = program.problem, program.problem.knots_per_slot
+    for members in problem.ground.groups:
+        ordered = [r for r in problem.ground.order if r in members]
+        if not set(members) <= set(dynamics.z):
+            continue
+        program.add("modes", sum(dynamics.z[r] for r in members) == len(members) - 1)
+        for r in members:
+            lands = (program.S + dynamics.D[r, "wheel"] - 1).T
+            program.add("modes", *implies_below(lands, dynamics.z[r][rho - 1 :: rho], 1.0))
+        rolls = (dynamics.group(members[0]) - program.S).T
+        for i in range(1, len(ordered)):
+            for part in (ordered[:i], ordered[i:]):
+                on = len(part) - sum(dynamics.z[r] for r in part)
+                end = on[rho - 1 :: rho]
+                start = np.isin(problem.start_regions, part).astype(float)[None]
+                begin = cp.vstack([start, end[:-1]]) if problem.slots > 1 else start
+                for at in range(rho - 1):
+                    program.add("modes", *implies_below(rolls, on[at::rho] - begin - end, 1.0))
+
+
+def _motion(program: Program, dynamics: Dynamics, grid: Grid) -> None:
+    """State eqs 2–6 and 19–21: which knots follow the spline, stay, or roll."""
     problem, p, x, v = program.problem, program.p, program.x, program.v
     K, L, rho = problem.knots, problem.legs, problem.knots_per_slot
-    swing = grid.spread @ program.S.T
-    rolls = grid.spread @ program.wheel.T
+    swing, walks, rolls = (grid.spread @ m.T for m in (program.S, dynamics.carrying("foot"), program.wheel))
     ends = grid.begin.argmax(axis=1) + rho
     big = 1.0 + problem.limits.speed[0] * problem.duration
+    columns = np.ones((1, L))
     for i in range(2):
         begin, now, end = grid.begin @ p[i], p[i][1:], p[i][ends]
         spline = begin + cp.multiply(grid.step.sum(axis=1)[:, None], end - begin)
         stays = now - p[i][:-1]
         step = p[i][rho::rho] - p[i][:-1:rho]
-        limit = problem.limits.step[i]
-        off = big * (1 - program.S.T)
-        program.add("step", step <= limit + off, -step <= limit + off)
+        program.add("step", *implies_below(program.S.T, step - problem.limits.step[i], big))
+        program.add("step", *implies_below(program.S.T, -step - problem.limits.step[i], big))
         if i == 1 or not problem.wheels:
             program.add("motion", *implies(swing, now - spline, big), *implies(1 - swing, stays, big))
             continue
-        start = np.array([[float(e == "wheel")] for e in problem.start_end_effectors])
-        before = (grid.spread @ cp.hstack([start, program.wheel[:, :-1]]).T, rolls)
-        columns = np.ones((1, L))
+        carried = sum(dynamics.before(r, "wheel") for r in range(problem.ground.count))
+        at_ends = (grid.spread @ carried.T, rolls)
         speeds = [cp.reshape(v[0][at], (K, 1), order="C") @ columns for at in (ends - rho, ends)]
         weights = [grid.lift.sum(axis=1)[:, None], grid.land.sum(axis=1)[:, None]]
         for lifts in (0, 1):
@@ -109,43 +189,93 @@ def _motion(program: Program, grid: Grid) -> None:
                 path = spline + sum(
                     cp.multiply(w, s) * on for w, s, on in zip(weights, speeds, (lifts, lands), strict=True)
                 )
-                which = [z if on else 1 - z for z, on in zip(before, (lifts, lands), strict=True)]
+                which = [z if on else 1 - z for z, on in zip(at_ends, (lifts, lands), strict=True)]
                 program.add("motion", *implies(swing + which[0] + which[1] - 2, now - path, big))
         rolled = cp.reshape(x[0][1:] - x[0][:-1], (K, 1), order="C") @ columns
-        program.add("motion", *implies(1 - swing - rolls, stays, big))
+        program.add("motion", *implies(walks - swing, stays, big))
         program.add("motion", *implies(rolls - swing, stays - rolled, big))
-    rise, ground = problem.robot.swing_height, problem.ground
-    apex = rise * grid.apex[1:].sum(axis=1)[:, None] @ np.ones((1, L))
-    program.add("motion", *implies(swing, p[2][1:] - ground - apex, 2 * rise))
-    program.add("motion", *implies(1 - swing, p[2][1:] - ground, 2 * rise), p[2][0] == ground)
-    A, b = problem.region.halfspaces
-    slots = slice(0, K + 1, rho)
-    for row, limit in zip(A, b, strict=True):
-        program.add("regions", row[0] * p[0][slots] + row[1] * p[1][slots] <= limit)
+    rise, (lowest, highest) = problem.robot.swing_height, _heights(problem)
+    big = 2 * (highest - lowest + rise)
+    begin, now, end = grid.begin @ p[2], p[2][1:], p[2][ends]
+    apex = rise * grid.apex[1:].sum(axis=1)[:, None] @ columns
+    spline = begin + cp.multiply(grid.climb.sum(axis=1)[:, None], end - begin) + apex
+    program.add("motion", *implies(swing, now - spline, big), *implies(walks - swing, now - p[2][:-1], big))
+    if problem.wheels:
+        # Regions of a group join without a step, so no wheel climbs faster than the steepest lets it.
+        climb = problem.ground.steepest * max(problem.limits.speed) * problem.dt * grid.age[:, None] @ columns
+        program.add("motion", *implies_below(rolls - swing, now - begin - climb, big))
+        program.add("motion", *implies_below(rolls - swing, begin - now - climb, big))
 
 
-def _forces(program: Program, grid: Grid) -> None:
-    """State eqs 7 and 26–29."""
-    problem, region = program.problem, program.problem.region
-    t, b, n = program.force
-    big = problem.limits.force
-    rolls = grid.spread @ program.wheel.T
-    program.add("friction", n <= big * (1 - grid.spread @ program.S.T))
-    if not problem.wheels:
-        program.add(
-            "friction", *(side <= 0 for side in friction_pyramid(n, t, b, region.mu_foot, region.mu_foot))
-        )
-        return
-    widest = 2 * big * max(region.mu_foot, region.mu_wheel, region.mu_wheel_lateral)
-    for side in friction_pyramid(n, t, b, region.mu_foot, region.mu_foot):
-        program.add("friction", side <= widest * rolls)
-    for side in friction_pyramid(n, t, b, region.mu_wheel, region.mu_wheel_lateral):
-        program.add("friction", side <= widest * (1 - rolls))
-    if region.rolling_resistance > 0:
-        most = region.rolling_resistance * big
-        program.add("friction", *implies(1 - rolls, program.friction[0], most))
-        drag = rolling_friction(n, region.rolling_resistance)
-        program.add("friction", *implies(rolls, program.friction[0] - drag, most))
+def _heights(problem: Problem) -> tuple[float, float]:
+    """Return the lowest and the highest ground."""
+    z = np.concatenate([region.vertices[:, 2] for region in problem.ground.regions])
+    return float(z.min()), float(z.max())
+
+
+def _regions(program: Program, dynamics: Dynamics, grid: Grid) -> None:
+    """State eqs 22–24: a foot is on its region where slots end, a wheel on one of its group at all knots."""
+    problem, ground, p = program.problem, program.problem.ground, program.p
+    rho, rise = problem.knots_per_slot, problem.robot.swing_height
+    places = Places.of(problem, ground)
+    lowest, highest = _heights(problem)
+    low = np.array([*places.low.min(axis=(1, 2)), lowest])
+    high = np.array([*places.high.max(axis=(1, 2)), highest + rise])
+
+    def most(normal: np.ndarray) -> float:
+        return float(np.maximum(normal * low, normal * high).sum())
+
+    inner = grid.spread * (grid.age < rho)[:, None]
+    for r, region in enumerate(ground.regions):
+        a_x, a_y, constant = ground.planes[r]
+        plane = np.array([-a_x, -a_y, 1.0])
+        steepness = max(most(plane) - constant, most(-plane) + constant, 0.0)
+        conditions = [(dynamics.D[r, "foot"].T, slice(rho, None, rho))]
+        if problem.wheels:
+            group = grid.spread @ dynamics.group(r).T
+            conditions.append((group - inner @ program.S.T - dynamics.off(r), slice(1, None)))
+        for condition, knots in conditions:
+            x, y, z = (p[i][knots] for i in range(3))
+            for a, b in zip(*region.halfspaces, strict=True):
+                big = max(most(np.array([*a, 0.0])) - b, 0.0)
+                program.add("regions", *implies_below(condition, a[0] * x + a[1] * y - b, big))
+            program.add("regions", *implies(condition, z - a_x * x - a_y * y - constant, steepness))
+
+
+def _forces(program: Program, dynamics: Dynamics, grid: Grid) -> None:
+    """State eqs 7 and 26–29, in the basis of the region that a contact is on when the interval ends."""
+    problem, force, limit = program.problem, program.force, program.problem.limits.force
+    swing, walks = (grid.spread @ m.T for m in (program.S, dynamics.carrying("foot")))
+    surfaces = problem.ground.surfaces
+    most = np.max([_largest_force(surface, problem) for surface in surfaces], axis=0)
+    drag = max(surface.rolling_resistance for surface in surfaces) * limit
+    resists = [i for i in range(3) if isinstance(program.friction[i], cp.Variable)]
+    program.add("friction", *(row for i in range(3) for row in implies(swing, force[i], most[i])))
+    for i in resists:
+        f = program.friction[i]
+        program.add("friction", *implies(swing, f, drag), *implies(walks, f, drag))
+    for (r, e), D in dynamics.D.items():
+        surface = next(surface for surface in surfaces if r in surface.regions)
+        normal, tangent, _ = surface.basis
+        n = sum(normal[i] * force[i] for i in range(3))
+        condition = grid.spread @ D.T - swing
+        if e == "wheel":
+            condition = grid.spread @ dynamics.group(r).T - swing - dynamics.off(r)
+        # The pyramid of the basis itself: each side as its coefficients of the force's components.
+        for side in friction_pyramid(*surface.basis, *surface.friction[e]):
+            inside = sum(side[i] * force[i] for i in range(3) if side[i])
+            program.add("friction", *implies_below(condition, inside, np.abs(side) @ most))
+        program.add("friction", *implies_below(condition, n - limit, np.abs(normal) @ most))
+        for i in resists if e == "wheel" else ():
+            drawn = tangent[i] * rolling_friction(n, surface.rolling_resistance)
+            big = drag * (1.0 + np.abs(normal) @ most / limit)
+            program.add("friction", *implies(condition, program.friction[i] - drawn, big))
+
+
+def _largest_force(surface: Surface, problem: Problem) -> np.ndarray:
+    """Return the largest magnitude of each component of a contact force, in body weights."""
+    mu = np.max([surface.friction[e] for e in problem.end_effectors], axis=0)
+    return problem.limits.force * (np.array([1.0, *mu]) @ np.abs(surface.basis))
 
 
 def _centroid(program: Program, grid: Grid) -> None:
@@ -153,7 +283,7 @@ def _centroid(program: Program, grid: Grid) -> None:
     problem = program.problem
     L, J, K = problem.legs, problem.slots, problem.knots
     most = max(len(p) for p in problem.patterns)
-    s = cp.Variable((most + 1, J), boolean=True, name="s")
+    s = program.discrete["s"] = cp.Variable((most + 1, J), boolean=True, name="s")
     program.add("centroid", np.arange(most + 1) @ s == cp.sum(program.S, axis=0), cp.sum(s, axis=0) == 1)
     swing = grid.spread @ program.S.T
     big = 1.0 + problem.limits.speed[0] * problem.duration + max(map(abs, problem.start))
@@ -168,9 +298,27 @@ def _centroid(program: Program, grid: Grid) -> None:
             program.add("centroid", *implies(here, (L - n) * c - cp.sum(vertex, axis=1), 2 * L * big))
 
 
+def gait_of(program: Program) -> Gait:
+    """Return the gait that the binaries' values say: where feet are from D, and wheels from z."""
+    problem, values = program.problem, {k: np.rint(v.value) for k, v in program.discrete.items()}
+    ground, rho = problem.ground, problem.knots_per_slot
+    S = values["S"].astype(int)
+    wheel, occupied = np.zeros_like(S), []
+    for r in range(ground.count):
+        occupied.append(values["D", r, "foot"])
+        if problem.wheels:
+            group = sum(values["D", m, "wheel"] for m in ground.groups[ground.group_of[r]])
+            on = 1 - values["z", r][rho - 1 :: rho].T if ("z", r) in values else 1
+            occupied[r] = occupied[r] + group * on
+            wheel += values["D", r, "wheel"].astype(int)
+    return Gait(S, wheel, np.argmax(occupied, axis=0))
+
+
 def solve(problem: Problem, gap: float, time_limit: float) -> Plan:
     """Give the paper's program to SCIP through CVXPY (see :func:`wfbook.planner.solve`)."""
     begin = time.perf_counter()
+    if (problem.start_regions < 0).any():
+        raise InfeasibleError(conflicting_groups(problem))
     program = build(problem)
     stated = cp.Problem(cp.Minimize(program.cost), program.rows())
     data, chain, inverse = stated.get_problem_data(cp.SCIP)
@@ -189,8 +337,6 @@ def solve(problem: Problem, gap: float, time_limit: float) -> Plan:
         # "May be inaccurate" is how CVXPY calls a gap or time limit; the plan's meta says which it was.
         warnings.simplefilter("ignore", UserWarning)
         stated.unpack_results(answer, chain, inverse)
-    S = np.rint(program.S.value)
-    wheel = np.rint(program.wheel.value) if problem.wheels else np.zeros_like(S)
     objective, bound = float(stated.value), min(model.getDualbound() + _offset(inverse), float(stated.value))
     statuses = {"timelimit": "time limit", "userinterrupt": "interrupted"}
     meta = {
@@ -207,7 +353,7 @@ def solve(problem: Problem, gap: float, time_limit: float) -> Plan:
         "solve_time": spent,
         "build_time": built,
     }
-    return plan_of(problem, read(program), S, wheel, meta)
+    return plan_of(problem, read(program), gait_of(program), meta)
 
 
 def _offset(inverse: list[Any]) -> float:

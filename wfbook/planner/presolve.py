@@ -13,6 +13,9 @@ from wfbook.planner.conic import Conic, Solution, solve
 
 _TOLERANCE = 1e-9
 
+_NOTHING = 1e-11
+"""A coefficient that is rounding error: dividing by it would decide a variable by noise."""
+
 
 def solve_fixed(conic: Conic, columns: np.ndarray, values: np.ndarray) -> Solution:
     """Minimise a program with some variables fixed.
@@ -71,6 +74,7 @@ def _decide(
     free = np.flatnonzero(~known)
     rest = b[rows] - A[rows] @ y
     part = A[rows][:, free].tocsr()
+    part.data[np.abs(part.data) < _NOTHING] = 0.0
     part.eliminate_zeros()
     count = np.diff(part.indptr)
     is_equal = equal[rows]
