@@ -261,11 +261,21 @@ def _bodies(p: Trajectory, ledger: Ledger) -> None:
 
 
 def _rest(p: Trajectory, ledger: Ledger) -> None:
-    """What the options claim beyond the paper: rest at the start and at the end, where a foot must stand."""
+    """What the options claim beyond the paper: rest at the start and at the end, where a foot must stand.
+
+    A plan that begins in motion says in which state.
+    """
     ledger.add("start", p.x[0, :2] - p.meta["start"], knot=0)
-    for name in ("v", "theta", "omega"):
-        ledger.add("start", getattr(p, name)[0], knot=0)
+    initial = p.meta.get("initial") or {}
+    if initial:
+        ledger.add("start", p.x[0] - initial["position"], knot=0)
+    for name, stated in (("v", "velocity"), ("theta", "angles"), ("omega", "rates")):
+        ledger.add("start", getattr(p, name)[0] - initial.get(stated, np.zeros(3)), knot=0)
     options = p.meta["options"]
+    for leg in range(4):
+        ledger.add("start", p.p[0, leg] - initial.get("contacts", p.p[0])[leg], leg, 0)
+        if options["stance_between_swings"] and initial:
+            ledger.require("stance between swings", not (initial["swung"][leg] and p.S[leg, 0]), leg, 0)
     if options["final_stance"]:
         for name in ("v", "omega"):
             ledger.add("end at rest", getattr(p, name)[-1], knot=p.K)
@@ -302,11 +312,14 @@ def _limits(p: Trajectory, ledger: Ledger) -> None:
 def objective(plan: Any) -> float:
     """Work out the cost of a plan (eqs 31-33) with the weights in its meta.
 
-    Forces and bounds are in body weights. The height that is rewarded is that of the start.
+    Forces and bounds are in body weights. The height that is rewarded is that of the start at rest.
     """
     p = plan if isinstance(plan, Trajectory) else Trajectory(plan)
     w = p.meta["weights"]
     terms = {name: 0.0 for name in w}
+    initial = p.meta.get("initial")
+    height = p.meta["com_height"] + p.p[0, :, 2].mean() if initial else p.x[0, 2]
+    before = initial["slot"] if initial else 0
     terms["goal"] = np.sum((p.x[-1, :2] - p.meta["goal"]) ** 2)
     terms["goal_angle"] = np.sum(p.theta[-1] ** 2)
     for k in range(p.K):
@@ -314,11 +327,11 @@ def objective(plan: Any) -> float:
         terms["force"] += np.sum((p.lam[k] / p.weight) ** 2)
         terms["bounds"] += np.sum(p.U_plus[k] + p.U_minus[k]) / p.weight
         terms["centroid"] += np.sum((p.x[k + 1, :2] - p.c[k, :2]) ** 2)
-        terms["height"] += (p.x[k + 1, 2] - p.x[0, 2]) ** 2
+        terms["height"] += (p.x[k + 1, 2] - height) ** 2
         terms["angle"] += np.sum(p.theta[k + 1] ** 2)
         terms["angular_rate"] += np.sum(p.omega[k + 1] ** 2)
     for j in range(p.J):
-        terms["swing"] += (j + 1) * np.sum(p.S[:, j])
+        terms["swing"] += (before + j + 1) * np.sum(p.S[:, j])
     return float(sum(w[name] * terms[name] for name in w))
 
 

@@ -59,6 +59,8 @@ class Boxes:
         upper[layout.T] = L * np.arange(1, J + 1)
         if self.problem.final_stance:
             upper[layout.S[:, -1]] = 0
+        if self.problem.stance_between_swings:
+            upper[layout.S[self.problem.start_state.swung, 0]] = 0
         return self.propagate(lower, upper)
 
     def propagate(self, lower: np.ndarray, upper: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:

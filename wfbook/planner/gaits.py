@@ -133,7 +133,7 @@ def improve(
         tried = ranked(templates(problem) if current is None else neighbours(problem, *current), best)[
             :_EXACT
         ]
-        costs = kernel.price(tried)
+        costs = [c if c < np.inf else np.inf for c in kernel.price(tried)]  # NaN is no answer
         if not costs or min(costs) >= best or stop():
             return
         best, current = min(costs), tried[int(np.argmin(costs))]

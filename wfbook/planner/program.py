@@ -157,13 +157,17 @@ def common(
     program.add("speed", *(side for i in (1, 2) for side in within(v[i], limits.lateral_speed)))
     program.add("speed", *(side for angle in theta for side in within(angle, limits.angle)))
 
-    place = (*problem.start, height)
-    program.add(
-        "start",
-        *(x[i][0] == place[i] for i in range(3)),
-        *(p[i][0] == problem.start_contacts[:, i] for i in (0, 1)),
-    )
-    program.add("start", *(z[0] == 0 for z in (*v, *theta, *omega)))
+    state = problem.start_state
+    program.add("start", *(p[i][0] == state.contacts[:, i] for i in (0, 1)))
+    for vector, value in (
+        (x, state.position),
+        (v, state.velocity),
+        (theta, state.angles),
+        (omega, state.rates),
+    ):
+        program.add("start", *(vector[i][0] == value[i] for i in range(3)))
+    if problem.stance_between_swings and state.swung.any():
+        program.add("modes", S[np.flatnonzero(state.swung), 0] == 0)
     if problem.final_stance:
         program.add("end", *(z[K] == 0 for z in (*v, *omega)), S[:, -1] == 0)
         nominal = robot.stance
@@ -210,6 +214,6 @@ def motion_cost(program: Program) -> Any:
         w.height * cp.sum_squares(program.x[2][1:] - height),
         w.angle * sum(cp.sum_squares(angle[1:]) for angle in program.theta),
         w.angular_rate * sum(cp.sum_squares(rate[1:]) for rate in program.omega),
-        w.swing * cp.sum(program.S @ np.arange(1, problem.slots + 1)),
+        w.swing * cp.sum(program.S @ problem.slot_numbers),
     ]
     return sum(terms)

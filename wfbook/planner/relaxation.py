@@ -56,15 +56,16 @@ def build(problem: Problem) -> Relaxation:
     discrete = {"pattern": chosen} | {("stance", e): v for e, v in stance.items()}
     discrete |= {("landing", e): v for e, v in landing.items()}
     constraints = flow(problem, S, stance, landing) + hull
-    cost = w.swing * cp.sum(S @ np.arange(1, J + 1))
+    cost = w.swing * cp.sum(S @ problem.slot_numbers)
 
     x, v, a = ([cp.Variable(n) for _ in range(3)] for n in (K + 1, K + 1, K))
     height = problem.ground + robot.height
     rise = x[2]
     x[2] = height + rise
-    place = (*problem.start, height)
+    state = problem.start_state
     constraints += [r == 0 for r in midpoint_integration(x, v, a, dt)]
-    constraints += [x[i][0] == place[i] for i in range(3)] + [v[i][0] == 0 for i in range(3)]
+    constraints += [x[i][0] == state.position[i] for i in range(3)]
+    constraints += [v[i][0] == state.velocity[i] for i in range(3)]
     constraints += [v[0] <= limits.speed[0], v[0] >= -limits.speed[1], *within(rise, robot.reach[2])]
     if problem.final_stance:
         constraints += [v[i][K] == 0 for i in range(3)] + [S[:, -1] == 0]
