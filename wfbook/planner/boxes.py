@@ -72,6 +72,8 @@ class Boxes:
         upper[layout.T] = L * np.arange(1, J + 1)
         if self.problem.final_stance:
             upper[layout.S[:, -1]] = 0
+        if self.problem.stance_between_swings:
+            upper[layout.S[self.problem.start_state.swung, 0]] = 0
         if not self._reachable.any(axis=0).all() or not self.problem.start_in_reach:
             return None
         first = self._reachable.argmax(axis=0)

@@ -60,14 +60,15 @@ def build(problem: Problem, bounds: MotionBounds) -> Relaxation:
     contacts = Contacts.of(problem, places, inner_knots=False)
     S = contacts.S
     constraints = list(contacts.rows)
-    cost = w.swing * cp.sum(S @ np.arange(1, J + 1))
+    cost = w.swing * cp.sum(S @ problem.slot_numbers)
 
     x, v, a = ([cp.Variable(n) for _ in range(3)] for n in (K + 1, K + 1, K))
     rise = x[2]
-    x[2] = problem.start_height + rise
-    place = (*problem.start, problem.start_height)
+    state = problem.start_state
+    x[2] = state.position[2] + rise
     constraints += [r == 0 for r in midpoint_integration(x, v, a, dt)]
-    constraints += [x[i][0] == place[i] for i in range(3)] + [v[i][0] == 0 for i in range(3)]
+    constraints += [x[i][0] == state.position[i] for i in range(3)]
+    constraints += [v[i][0] == state.velocity[i] for i in range(3)]
     constraints += [v[0] <= limits.speed[0], v[0] >= -limits.speed[1]]
     if problem.final_stance:
         constraints += [v[i][K] == 0 for i in range(3)] + [S[:, -1] == 0]
@@ -77,8 +78,9 @@ def build(problem: Problem, bounds: MotionBounds) -> Relaxation:
     shares, rows = region_shares(contacts, places)
     constraints += rows
     if ground.level is not None:
-        constraints += within(rise, robot.reach[2])
-        cost += w.height * cp.sum_squares(rise) + _vertical_levers(problem, x[2], contacts.sizes)
+        clearance = x[2] - ground.level - robot.height
+        constraints += within(clearance[1:], robot.reach[2])
+        cost += w.height * cp.sum_squares(clearance[1:]) + _vertical_levers(problem, x[2], contacts.sizes)
     else:
         part, rows = _heights(contacts, shares, x[2])
         cost += part
@@ -229,7 +231,8 @@ def _heights(contacts: Contacts, shares: dict, z: Any) -> tuple[Any, list[Any]]:
         farthest = problem.ground.steepest * max(problem.limits.speed) * problem.slot_duration / L * inner
         rows += within(rolled, cp.multiply(farthest, grid.spread @ cp.sum(contacts.rolling, axis=0)))
         above = above + rolled
-    rows += [clearance[0] == 0, clearance[1:] == above]
+    first = problem.start_state.position[2] - problem.start_heights.mean() - robot.height
+    rows += [clearance[0] == first, clearance[1:] == above]
     bump, n = _bumps(problem), np.arange(contacts.sizes.shape[0])
     swinging = grid.spread @ (contacts.sizes.T @ n)
     middle = 0.5 * (clearance[1:] + clearance[:-1]) + robot.height
