@@ -11,6 +11,7 @@ from wfbook import terrain
 from wfbook.modes import END_EFFECTORS
 from wfbook.planner import InfeasibleError, InitialState, Problem, polish, solve
 from wfbook.planner.extract import problem_of
+from wfbook.planner.gait import Gait
 from wfbook.planner.kernel import Kernel
 from wfbook.planner.symmetry import MIRROR
 
@@ -64,11 +65,12 @@ def test_the_optimum_in_motion_is_that_of_enumeration(whole):
             wheel = np.array([[int(e == "wheel")] * rest.slots for e in rest.start_end_effectors])
             for (leg, j), kind in zip(swings, kinds, strict=True):
                 wheel[leg, j:] = kind
-            if not kernel.boxes.admissible(S, wheel):
+            gait = Gait(S, wheel, np.zeros_like(S))
+            if not kernel.boxes.admissible(gait):
                 continue
-            leaf = kernel.leaf(S, wheel)
+            leaf = kernel.leaf(gait)
             if leaf.status == "solved":
-                assert kernel.gait_bounds([(S, wheel)])[0] <= leaf.value + 1e-6
+                assert kernel.gait_bounds([gait])[0] <= leaf.value + 1e-6
                 best = min(best, leaf.value)
     found = solve(rest, gap=1e-4)
     assert best - 1e-6 <= found.meta["objective"] <= best * (1 + 1.1e-4)

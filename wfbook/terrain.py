@@ -134,7 +134,8 @@ class Terrain:
         """Index of the highest region at (x, y), the first of equals, or None over no region.
 
         Args:
-            x, y: where to look.
+            x: where to look.
+            y: likewise.
             tolerance: how far outside of an edge still counts, in metres.
         """
         over = [i for i, region in enumerate(self.regions) if region.contains(x, y, tolerance)]

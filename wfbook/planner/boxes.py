@@ -151,7 +151,7 @@ class Boxes:
         return True
 
     def _regions(self, lower: np.ndarray, upper: np.ndarray, S_low: np.ndarray, S_up: np.ndarray) -> bool:
-        """Propagate the ladder: its steps fall, and without a swing a foot stays and a wheel keeps its group."""
+        """Propagate the ladder: its steps fall; without a swing a foot stays and a wheel keeps its group."""
         layout, problem = self.layout, self.problem
         low, up = lower[layout.G], upper[layout.G]
         low[:] = np.maximum.accumulate(low[::-1], axis=0)[::-1]

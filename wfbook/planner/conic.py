@@ -217,7 +217,7 @@ class Boxed:
             linear: coefficients of all variables of the program.
 
         Returns:
-            A lower bound of the optimum, ``-inf`` if there is no answer, and the linear part at the minimiser.
+            A lower bound of the optimum, ``-inf`` without an answer, and the linear part at the minimiser.
         """
         self._solver.update(q=self._q + linear)
         self._cutoff = np.inf

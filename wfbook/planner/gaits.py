@@ -58,7 +58,7 @@ def templates(problem: Problem) -> Iterator[Gait]:
 
 
 def neighbours(problem: Problem, gait: Gait) -> Iterator[Gait]:
-    """Yield gaits one small change away, their regions open: drop or shift a swing, change what it lands on."""
+    """Yield gaits one small change away: drop or shift a swing, change what it lands on; regions open."""
     S, wheel, _ = gait
     L, J = S.shape
     landed = [[(j, wheel[leg, j]) for j in np.flatnonzero(S[leg])] for leg in range(L)]

@@ -87,7 +87,7 @@ class Kernel:
         rows += [C[:, 0] == S[:, 0], C[:, 1:] == C[:, :-1] + S[:, 1:], cp.sum(C, axis=0) == T]
         for m, G in enumerate(ladder, start=1):
             behind = [contacts.occupancy(r) for r in order[m:] if r in contacts.regions]
-            rows.append(G == sum(behind) if behind else G == 0)
+            rows.append(sum(behind) - G == 0 if behind else G == 0)
         box = [S, C, T, *ladder]
         if problem.wheels:
             rows.append(wheel == contacts.wheel)
@@ -238,7 +238,7 @@ class Kernel:
         return self._leaves[key]
 
     def price(self, gaits: list[Gait], cutoff: float = np.inf) -> list[float]:
-        """Return the exact costs of gaits; infinite where infeasible, excluded or known to exceed a cutoff."""
+        """Return exact costs of gaits; infinite where infeasible, excluded or known to exceed a cutoff."""
         fresh = [g for g in gaits if g.key not in self._leaves and g.key not in self.excluded]
         found = self._shared(self._exact, [(g, cutoff) for g in fresh])
         for gait, solution in zip(fresh, found, strict=True):

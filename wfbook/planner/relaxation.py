@@ -54,7 +54,7 @@ def build(problem: Problem, bounds: MotionBounds) -> Relaxation:
         problem: what is asked.
         bounds: of the centre of mass; if they hold for plans below some cost only, so does the QP.
     """
-    J, K, rho, dt = problem.slots, problem.knots, problem.knots_per_slot, problem.dt
+    J, K, dt = problem.slots, problem.knots, problem.dt
     w, robot, limits, ground = problem.weights, problem.robot, problem.limits, problem.ground
     places = Places.of(problem, bounds)
     contacts = Contacts.of(problem, places, inner_knots=False)

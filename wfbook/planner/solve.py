@@ -137,6 +137,8 @@ class Search:
             time_limit: of all searches together, in seconds.
             progress: called now and then.
         """
+        if not problem.start_in_reach:
+            raise InfeasibleError(conflicting_groups(problem))
         begin = time.perf_counter()
         self.problem, self.gap, self.progress = problem, gap, progress
         self.kernel = Kernel(problem)

@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 
-from wfbook.planner.gait import Gait
 from wfbook.planner.problem import Problem
 from wfbook.terrain import Region
 
@@ -59,12 +58,6 @@ def _numbers(region: Region, vertices: np.ndarray) -> tuple:
     corners = sorted(map(tuple, (np.round(vertices, 9) + 0.0).tolist()))
     surface = (region.mu_foot, region.mu_wheel, region.mu_wheel_lateral, region.rolling_resistance)
     return (*corners, *surface)
-
-
-def mirrored(problem: Problem, gait: Gait) -> Gait:
-    """Return a gait of a symmetric problem with left and right exchanged."""
-    swapped = [part[list(MIRROR)] for part in gait]
-    return Gait(*swapped[:2], mirrored_regions(problem)[swapped[2]])
 
 
 def mirror_row(S: Any) -> Any:

@@ -198,7 +198,7 @@ def _regions(program: Program, contacts: Contacts, places: Places) -> None:
             *slopes, constant = ground.planes[r]
             heights = heights + constant * contacts.occupancy(r)
             heights = heights + sum(slopes[i] * shares[r][i] for i in places.axes if slopes[i])
-        program.add("regions", p[2][rho::rho].T == heights)
+        program.add("regions", heights - p[2][rho::rho].T == 0)
     for at, here in enumerate(contacts.passing, start=1):
         point = [p[i][at::rho].T for i in range(3)]
         for r, inside in here.items():
