@@ -13,7 +13,7 @@ TROT = ((0, 3), (1, 2))
 CRAWL = ((2,), (0,), (3,), (1,))
 
 _EXACT = 2  # gaits solved exactly in each round of the local search
-_ROUNDS = 6
+_ROUNDS = 10
 _DIVES = 400  # relaxations that a dive may take
 _BATCH = 8  # gaits bounded between two looks at the clock
 
@@ -71,6 +71,10 @@ def neighbours(problem: Problem, gait: Gait) -> Iterator[Gait]:
                     yield _with(problem, gait, leg, sorted([*rest, (other, kind)]))
             if problem.wheels:
                 yield _with(problem, gait, leg, sorted([*rest, (j, 1 - kind)]))
+    for leg, j in np.argwhere((S == 0) & (wheel == 1)) if _rolling_slows(problem) else ():
+        # A push: down on the foot, and two slots later on the wheel again.
+        if j + 2 < J and not S[leg, j : j + 3].any():
+            yield _with(problem, gait, leg, sorted([*landed[leg], (j, 0), (j + 2, 1)]))
     for pair in ((0, 3), (1, 2)):
         for j in range(J):
             if S[pair[0], j] and S[pair[1], j]:
@@ -79,6 +83,12 @@ def neighbours(problem: Problem, gait: Gait) -> Iterator[Gait]:
                     rest = [s for s in landed[leg] if s[0] != j]
                     changed = _with(problem, changed, leg, rest)
                 yield changed
+
+
+def _rolling_slows(problem: Problem) -> bool:
+    """Tell whether wheels lose speed, so that it is worth a swing to push."""
+    ground = problem.ground
+    return ground.level is None or any(s.rolling_resistance > 0 for s in ground.surfaces)
 
 
 def _with(problem: Problem, gait: Gait, leg: int, landings: list) -> Gait:
