@@ -1,6 +1,6 @@
 """Gaits a roboticist would try first, and small changes to a gait: the search's primal heuristics."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -98,13 +98,14 @@ def mirrored(gait: Gait) -> Gait:
 
 
 def improve(
-    kernel: Kernel, stop: Callable[[], bool] = lambda: False
+    kernel: Kernel, stop: Callable[[], bool] = lambda: False, known: Sequence[Gait] = ()
 ) -> Iterator[tuple[float, np.ndarray, np.ndarray]]:
-    """Yield ever better gaits: templates ranked by the QP, the best solved exactly, then changed bit by bit.
+    """Yield ever better gaits: the best templates by the QP, solved exactly, then changed bit by bit.
 
     Args:
         kernel: bounds and leaves of the problem.
         stop: asked now and then; once true, nothing more is tried.
+        known: gaits to try before all others, such as the rest of an earlier plan.
 
     Yields:
         Cost, swing matrix and wheel's dynamics matrix, each better than the one before.
@@ -129,12 +130,17 @@ def improve(
         return [fresh[i] for i in order if bounds[i] < below]
 
     best, current = np.inf, None
-    for _ in range(_ROUNDS):
-        tried = ranked(templates(problem) if current is None else neighbours(problem, *current), best)[
-            :_EXACT
-        ]
+    for turn in range(_ROUNDS + 1):
+        if turn == 0:
+            tried = [gait for gait in known if kernel.boxes.admissible(*gait)]
+        else:
+            gaits = templates(problem) if turn == 1 else neighbours(problem, *current)
+            tried = ranked(gaits, best)[:_EXACT]
         costs = [c if c < np.inf else np.inf for c in kernel.price(tried)]  # NaN is no answer
-        if not costs or min(costs) >= best or stop():
+        if costs and min(costs) < best:
+            best, current = min(costs), tried[int(np.argmin(costs))]
+            yield best, *current
+        elif turn > 1 or (turn == 1 and current is None):
             return
-        best, current = min(costs), tried[int(np.argmin(costs))]
-        yield best, *current
+        if stop():
+            return

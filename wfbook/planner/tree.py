@@ -9,7 +9,7 @@ import contextlib
 import signal
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,7 +17,7 @@ import numpy as np
 from pyscipopt import SCIP_HEURTIMING, SCIP_PARAMSETTING, SCIP_RESULT, Branchrule, Conshdlr, Heur, Model
 from pyscipopt.scip import Relax
 
-from wfbook.planner.gaits import improve
+from wfbook.planner.gaits import Gait, improve
 from wfbook.planner.kernel import INTEGRAL, Kernel
 
 
@@ -31,6 +31,7 @@ class Progress:
         bound: no plan costs less.
         gap: ``(incumbent − bound) / incumbent``; infinite without an incumbent.
         time: since the search began.
+        part: which slots are searched, where that is not all of them.
     """
 
     nodes: int
@@ -38,6 +39,7 @@ class Progress:
     bound: float
     gap: float
     time: float
+    part: str = ""
 
 
 @dataclass
@@ -49,6 +51,7 @@ class Tree:
         gap: relative gap at which the search ends.
         time_limit: in seconds, for the search.
         progress: called with a :class:`Progress` now and then.
+        gaits: to be priced before anything else, whatever the time limit.
         best: cost, swing matrix and wheel's dynamics matrix of the incumbent.
     """
 
@@ -56,6 +59,7 @@ class Tree:
     gap: float
     time_limit: float
     progress: Callable[[Progress], None] | None = None
+    gaits: Sequence[Gait] = ()
     best: tuple[float, np.ndarray, np.ndarray] | None = None
     root_bound: float = -np.inf
     error: BaseException | None = None
@@ -87,6 +91,12 @@ class Tree:
         if root is None or self.kernel.bound(*root).status == "infeasible":
             return "infeasible", np.inf, 0
         self.root_bound = self.kernel.bound(*root).bound
+        for gait in self.gaits:
+            if (
+                self.kernel.boxes.admissible(*gait)
+                and (value := self.kernel.leaf(*gait).value) < self.incumbent
+            ):
+                self.best = (value, *gait)
         self.model = model = Model()
         model.hideOutput()
         model.setPresolve(SCIP_PARAMSETTING.OFF)
@@ -123,7 +133,7 @@ class Tree:
         with self._interruptible():
             model.optimize()
         status, nodes = model.getStatus(), int(model.getNTotalNodes())
-        bound = min(model.getDualbound(), self.kernel.pruned, self.incumbent)
+        bound = min(max(model.getDualbound(), self.root_bound), self.kernel.pruned, self.incumbent)
         if isinstance(self.error, KeyboardInterrupt):
             return "interrupted", bound, nodes
         if self.error is not None:
@@ -346,7 +356,7 @@ class _Gaits(Heur):
             tree.report()
             return tree.error is not None or tree.elapsed > tree.time_limit
 
-        for value, S, wheel in improve(tree.kernel, late):
+        for value, S, wheel in improve(tree.kernel, late, tree.gaits):
             if value < tree.incumbent:
                 tree._keep(value, S, wheel)
                 found |= tree.submit(self)
