@@ -5,7 +5,7 @@ shares, :mod:`.bigm` is the paper's own, :mod:`.tight` the fast one. :mod:`.coni
 Clarabel, :mod:`.presolve` removes what fixed binaries decide, :mod:`.relaxation` bounds cheaply.
 :mod:`.boxes` and :mod:`.symmetry` are the logic of gaits, :mod:`.kernel` bounds and splits, on two cores
 with :mod:`.worker`, :mod:`.gaits` guesses, :mod:`.tree` lets SCIP search, :mod:`.explain` says why there is
-nothing to find. :mod:`.polish` makes the result true, :mod:`.plan` keeps it.
+nothing to find. :mod:`.polish` makes the result true, :mod:`.plan` keeps it. :mod:`.windows` plans far.
 """
 
 from wfbook.planner.explain import InfeasibleError, NoPlanError
@@ -14,6 +14,7 @@ from wfbook.planner.polish import polish, repaired, torque_mismatch
 from wfbook.planner.problem import InitialState, Limits, Problem, Weights
 from wfbook.planner.solve import solve, solve_executable
 from wfbook.planner.tree import Progress
+from wfbook.planner.windows import solve_windows
 
 __all__ = [
     "InfeasibleError",
@@ -28,5 +29,6 @@ __all__ = [
     "repaired",
     "solve",
     "solve_executable",
+    "solve_windows",
     "torque_mismatch",
 ]

@@ -107,14 +107,15 @@ def _open(S: np.ndarray, wheel: np.ndarray) -> Gait:
 
 
 def improve(
-    kernel: Kernel, first: Sequence[Gait] = (), stop: Callable[[], bool] = lambda: False
+    kernel: Kernel, stop: Callable[[], bool] = lambda: False, known: Sequence[Gait] = ()
 ) -> Iterator[tuple[float, Gait]]:
-    """Yield ever better gaits: templates ranked by the QP, the best solved exactly, then changed bit by bit.
+    """Yield ever better gaits: the best templates by the QP, solved exactly, then changed bit by bit.
 
     Args:
         kernel: bounds and leaves of the problem.
         first: gaits to try besides the templates.
         stop: asked now and then; once true, nothing more is tried.
+        known: gaits to try before all others, such as the rest of an earlier plan.
 
     Yields:
         Cost and gait, each better than the one before.
@@ -142,17 +143,23 @@ def improve(
         return [fresh[i] for i in order if bounds[i] < below]
 
     best, current = np.inf, None
-    for _ in range(_ROUNDS):
-        candidates = [*first, *templates(problem)] if current is None else neighbours(problem, current)
-        tried = [g for g in kernel.complete(ranked(candidates, best)[:_EXACT]) if g is not None]
+    for turn in range(_ROUNDS + 1):
+        if turn == 0:
+            tried = [gait for gait in known if kernel.boxes.admissible(gait)]
+        else:
+            candidates = templates(problem) if turn == 1 else neighbours(problem, current)
+            tried = [g for g in kernel.complete(ranked(candidates, best)[:_EXACT]) if g is not None]
         costs = kernel.price(tried, best)
-        if current is None and not np.isfinite(min(costs, default=np.inf)):
+        if turn == 1 and current is None and not np.isfinite(min(costs, default=np.inf)):
             tried = list(dive(kernel, stop))
             costs = kernel.price(tried)
-        if not costs or min(costs) >= best or stop():
+        if costs and min(costs) < best:
+            best, current = min(costs), tried[int(np.argmin(costs))]
+            yield best, current
+        elif turn > 1 or (turn == 1 and current is None):
             return
-        best, current = min(costs), tried[int(np.argmin(costs))]
-        yield best, current
+        if stop():
+            return
 
 
 def dive(kernel: Kernel, stop: Callable[[], bool] = lambda: False) -> Iterator[Gait]:

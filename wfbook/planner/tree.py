@@ -32,6 +32,7 @@ class Progress:
         bound: no plan costs less.
         gap: ``(incumbent − bound) / incumbent``; infinite without an incumbent.
         time: since the search began.
+        part: which slots are searched, where that is not all of them.
     """
 
     nodes: int
@@ -39,6 +40,7 @@ class Progress:
     bound: float
     gap: float
     time: float
+    part: str = ""
 
 
 @dataclass
@@ -50,7 +52,7 @@ class Tree:
         gap: relative gap at which the search ends.
         time_limit: in seconds, for the search.
         progress: called with a :class:`Progress` now and then.
-        first: gaits to try before others.
+        gaits: to be priced before anything else, whatever the time limit.
         best: cost and gait of the incumbent.
     """
 
@@ -58,7 +60,7 @@ class Tree:
     gap: float
     time_limit: float
     progress: Callable[[Progress], None] | None = None
-    first: Sequence[Gait] = ()
+    gaits: Sequence[Gait] = ()
     best: tuple[float, Gait] | None = None
     root_bound: float = -np.inf
     error: BaseException | None = None
@@ -109,7 +111,7 @@ class Tree:
 
     def _prepare(self) -> dict[str, Any]:
         """Find a first plan, and narrow the search to what is better."""
-        for value, gait in improve(self.kernel, self.first, self._late):
+        for value, gait in improve(self.kernel, self._late, self.gaits):
             if value < self.incumbent:
                 self._keep(value, gait)
         if self.best is not None and self.cutoff > self.root_bound:
