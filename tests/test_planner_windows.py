@@ -19,6 +19,7 @@ from wfbook.planner import (
     solve_windows,
     windows,
 )
+from wfbook.planner.gait import Gait
 from wfbook.planner.solve import Search
 from wfbook.planner.windows import intermediate_goal
 
@@ -92,7 +93,7 @@ def test_a_given_gait_is_a_plan_whatever_the_time_limit():
     p = problem(8)
     S = np.zeros((4, 8), int)
     S[[0, 3], 1], S[[1, 2], 2] = 1, 1
-    search = Search(p, 1e-3, 1e-3, None, [(S, 0 * S)])
+    search = Search(p, 1e-3, 1e-3, None, [Gait(S, 0 * S, 0 * S)])
     plan = search.run()
     search.close()
     np.testing.assert_array_equal(plan.S, S)
@@ -112,7 +113,8 @@ def test_a_problem_in_motion_is_planned_in_windows(searched):
     swung = np.array([True, False, False, True])
     state = replace(p.start_state, velocity=np.array([0.2, 0.0, 0.0]), swung=swung, slot=2)
     relaxed, polished = solve_windows(p.begun(state, ("foot",) * 4), window=4, commit=3, gap=0.3)
-    assert searched[0][0].initial is state
+    begun = searched[0][0].initial
+    assert all(np.array_equal(getattr(begun, name), value) for name, value in vars(state).items())
     assert searched[1][0].initial.slot == 5
     assert not relaxed.S[swung, 0].any()
     assert plan_checker.check(relaxed)[0] == []
