@@ -44,6 +44,8 @@ PLANNING = {
 }
 """Options of planning and their defaults; no goal means ``GOAL_PER_SLOT`` ahead for each slot."""
 GOAL_PER_SLOT = 0.1
+LONG = 12
+"""Slots beyond which a first plan is found in overlapping windows."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -214,15 +216,13 @@ def _planned(problem: "Problem", arguments: argparse.Namespace) -> "tuple[Plan, 
     """
     from wfbook import planner
 
+    options = {"gap": arguments.gap, "time_limit": arguments.time_limit}
     with ProgressLine(sys.stderr) as line:
+        options["progress"] = lambda now: line.show(f"planning {search_line(now)}")
         try:
-            return planner.solve_executable(
-                problem,
-                formulation=arguments.formulation,
-                gap=arguments.gap,
-                time_limit=arguments.time_limit,
-                progress=lambda now: line.show(f"planning {search_line(now)}"),
-            )
+            if problem.slots > LONG and arguments.formulation == "tight":
+                return planner.solve_windows(problem, **options)
+            return planner.solve_executable(problem, formulation=arguments.formulation, **options)
         except (planner.InfeasibleError, planner.NoPlanError) as error:
             raise CommandError(" ".join(str(error).split()), FAILED) from None
 

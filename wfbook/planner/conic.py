@@ -15,8 +15,8 @@ class Solution:
     """What Clarabel found.
 
     Attributes:
-        status: "solved", "cut" (stopped when the bound had passed a cutoff), "infeasible" or "failed"
-            (no answer to be trusted).
+        status: "solved", "rough" (a solution, but not the best), "cut" (stopped when the bound had passed a
+            cutoff), "infeasible" or "failed" (no answer to be trusted).
         value: the primal objective; infinite if infeasible, NaN if cut or failed.
         bound: a lower bound of the optimum: the lesser of primal and dual objective; ``-inf`` if failed.
         y: the compiled program's variables.

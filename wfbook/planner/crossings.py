@@ -20,6 +20,7 @@ CLOSE = 2e-4
 """Relative gap at which the search for crossings ends; it stays in the bound."""
 
 _NODES = 30
+_QUICK = 4
 
 
 class Crossings:
@@ -34,13 +35,14 @@ class Crossings:
         """
         self._program, self._conic = program, conic
 
-    def solve(self, columns: np.ndarray, values: np.ndarray, cutoff: float) -> Solution:
+    def solve(self, columns: np.ndarray, values: np.ndarray, cutoff: float, quick: bool) -> Solution:
         """Minimise over all crossings.
 
         Args:
             columns: of the discrete variables.
             values: theirs; NaN where a crossing leaves them open.
             cutoff: if no crossing costs less, which one is best is not asked: the status is "cut".
+            quick: try no more than the most likely crossings: if that leaves doubt, the status is "rough".
 
         Returns:
             The best solution. Its bound holds for every crossing.
@@ -53,7 +55,7 @@ class Crossings:
             return replace(found, status="cut", value=np.nan)
         best: Solution | None = None
         queue = [(found.bound, 0, values, found)]
-        for count in range(1, _NODES):
+        for count in range(1, _QUICK if quick else _NODES):
             if not queue or queue[0][0] >= min(cutoff, best.value * (1 - CLOSE) if best else np.inf):
                 break
             _, _, known, relaxed = heapq.heappop(queue)
@@ -61,7 +63,7 @@ class Crossings:
             tried = solve_fixed(self._conic, columns, rounded)
             if tried.status == "solved" and (best is None or tried.value < best.value):
                 best = tried
-            if best and relaxed.bound >= best.value * (1 - CLOSE):
+            if best and (quick or relaxed.bound >= best.value * (1 - CLOSE)):
                 heapq.heappush(queue, (relaxed.bound, -count, known, relaxed))
                 break
             left = np.flatnonzero(np.isnan(known))
@@ -81,8 +83,9 @@ class Crossings:
         if best is None and not queue:
             return Solution("infeasible", np.inf, np.inf, found.y)
         if best is None:
-            return Solution("cut", np.nan, bound, found.y)
-        return Solution("solved", best.value, min(best.bound, bound), best.y)
+            return Solution("rough" if quick else "cut", np.inf, bound, found.y)
+        status = "rough" if bound < min(cutoff, best.value * (1 - CLOSE)) else "solved"
+        return Solution(status, best.value, min(best.bound, bound), best.y)
 
     def _where_it_is(self, known: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the values with every open wheel in the region over which it is in a solution."""

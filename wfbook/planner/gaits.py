@@ -149,10 +149,10 @@ def improve(
         else:
             candidates = templates(problem) if turn == 1 else neighbours(problem, current)
             tried = [g for g in kernel.complete(ranked(candidates, best)[:_EXACT]) if g is not None]
-        costs = kernel.price(tried, best)
+        costs = kernel.price(tried, best, quick=True)
         if turn == 1 and current is None and not np.isfinite(min(costs, default=np.inf)):
             tried = list(dive(kernel, stop))
-            costs = kernel.price(tried)
+            costs = kernel.price(tried, quick=True)
         if costs and min(costs) < best:
             best, current = min(costs), tried[int(np.argmin(costs))]
             yield best, current
@@ -187,7 +187,7 @@ def dive(kernel: Kernel, stop: Callable[[], bool] = lambda: False) -> Iterator[G
             continue
         if (box[0] == box[1]).all():
             gait = boxes.gait(box[0])
-            if np.isfinite(kernel.price([gait])[0]):
+            if np.isfinite(kernel.price([gait], quick=True)[0]):
                 yield gait
                 return
             continue

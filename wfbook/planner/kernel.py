@@ -216,32 +216,38 @@ class Kernel:
             found = self._bounds[_key(lower, upper)] = self._solve(lower, upper, cutoff)
         return found
 
-    def leaf(self, gait: Gait, cutoff: float = np.inf) -> Solution:
+    def leaf(self, gait: Gait, cutoff: float = np.inf, quick: bool = False) -> Solution:
         """Solve the exact program at fixed binaries; infeasible if the gait is excluded.
 
         Args:
             gait: with its regions.
             cutoff: if the gait can't cost less, its cost may stay unknown (status "cut").
+            quick: be content with a plan of the gait, if not the best (status "rough").
         """
         key = gait.key
         if key in self.excluded:
             return Solution("infeasible", np.inf, np.inf, np.zeros(0))
         known = self._leaves.get(key)
-        if known is None or (known.status == "cut" and known.bound < cutoff):
-            self._enter(gait, self._exact(gait, cutoff))
+        if known is None or self._open(known, cutoff, quick):
+            self._enter(gait, self._exact(gait, cutoff, quick))
         found = self._leaves[key]
-        if found.status in ("solved", "cut"):
+        if found.status in ("solved", "cut") or (found.status == "rough" and not quick):
             self.pruned = min(self.pruned, found.bound)
         return found
 
-    def price(self, gaits: list[Gait], cutoff: float = np.inf) -> list[float]:
-        """Return exact costs of gaits; infinite where infeasible, excluded or known to exceed a cutoff."""
+    @staticmethod
+    def _open(known: Solution, cutoff: float, quick: bool) -> bool:
+        """Tell whether what is known of a leaf leaves a question open."""
+        return known.bound < cutoff and (known.status == "cut" or (known.status == "rough" and not quick))
+
+    def price(self, gaits: list[Gait], cutoff: float = np.inf, quick: bool = False) -> list[float]:
+        """Return costs of gaits (see :meth:`leaf`); infinite where infeasible, excluded or above a cutoff."""
         fresh = [g for g in gaits if g.key not in self._leaves and g.key not in self.excluded]
-        found = self._shared(self._exact, [(g, cutoff) for g in fresh])
+        found = self._shared(self._exact, [(g, cutoff, quick) for g in fresh])
         for gait, solution in zip(fresh, found, strict=True):
             self._enter(gait, solution)
-        leaves = [self.leaf(gait, cutoff) for gait in gaits]
-        return [leaf.value if leaf.status == "solved" else np.inf for leaf in leaves]
+        leaves = [self.leaf(gait, cutoff, quick) for gait in gaits]
+        return [leaf.value if leaf.status in ("solved", "rough") else np.inf for leaf in leaves]
 
     def _enter(self, gait: Gait, found: Solution) -> None:
         """Remember a leaf; what it leaves open keeps the proven bound below its own."""
@@ -250,10 +256,10 @@ class Kernel:
         if found.status == "failed":
             self.pruned = min(self.pruned, self._gait_qp(gait).bound)
 
-    def _exact(self, gait: Gait, cutoff: float = np.inf) -> Solution:
+    def _exact(self, gait: Gait, cutoff: float, quick: bool) -> Solution:
         assigned = assignment(self.problem, gait, self.program.discrete)
         fixed = np.concatenate([assigned[k].ravel() for k in self.program.discrete])
-        return self._crossings.solve(self._discrete, fixed, cutoff)
+        return self._crossings.solve(self._discrete, fixed, cutoff, quick)
 
     def placed(self, lower: np.ndarray, upper: np.ndarray) -> tuple[Solution, Gait | None]:
         """Bound a box in which only regions are open by the exact program with the regions relaxed.
@@ -285,7 +291,7 @@ class Kernel:
 
     def priced(self) -> list[Gait]:
         """Return the feasible gaits that were solved exactly, the cheapest first."""
-        feasible = [(found.value, key) for key, found in self._leaves.items() if found.status == "solved"]
+        feasible = [(v.value, key) for key, v in self._leaves.items() if np.isfinite(v.value)]
         return [Gait.from_key(key, self.problem.legs) for _, key in sorted(feasible)]
 
     def gait_bounds(self, gaits: list[Gait], cutoff: float = np.inf) -> list[float]:

@@ -144,7 +144,7 @@ class Price(Conshdlr):
         if np.abs(z - np.rint(z)).max() > INTEGRAL or not (known or tree.kernel.boxes.admissible(gait)):
             return {"result": SCIP_RESULT.INFEASIBLE}
         cost = tree.model.getSolVal(solution, tree.cost)
-        right = cost >= tree.kernel.leaf(gait).value - 1e-9
+        right = cost >= tree.kernel.leaf(gait, quick=True).value - 1e-9
         return {"result": SCIP_RESULT.FEASIBLE if right else SCIP_RESULT.INFEASIBLE}
 
     def consenfolp(self, constraints, n_useful, infeasible) -> dict[str, Any]:

@@ -189,7 +189,7 @@ class Search:
     def _plan(self, gait: Gait) -> Plan:
         """Return the plan of a priced gait, with what is proven of all gaits."""
         kernel = self.kernel
-        found = kernel.leaf(gait)
+        found = kernel.leaf(gait, quick=True)
         fill(kernel.program, kernel.conic, found.y)
         meta = {
             "stage": "relaxed",

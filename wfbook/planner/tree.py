@@ -95,7 +95,9 @@ class Tree:
             self.root_bound = self.kernel.bound(*root).bound
             self.guarded(self._prepare)
             nodes = self._branch() if self.error is None else 0
-        bound = min(max(self.dual_bound, self.root_bound), self.kernel.pruned, self.incumbent)
+        # No box is below the root, whatever a solver failed to say of it.
+        bound = max(min(self.dual_bound, self.kernel.pruned), self.root_bound)
+        bound = min(bound, self.incumbent)
         if isinstance(self.error, KeyboardInterrupt):
             return "interrupted", bound, nodes
         if self.error is not None:
@@ -215,8 +217,8 @@ class Tree:
             return
         self._shown = self.elapsed
         begun = self.model is not None
-        bound = max(self.model.getDualbound() if begun else -np.inf, self.root_bound)
-        bound = min(bound, self.kernel.pruned, self.incumbent)
+        dual = self.model.getDualbound() if begun else -np.inf
+        bound = min(max(min(dual, self.kernel.pruned), self.root_bound), self.incumbent)
         gap = (self.incumbent - bound) / self.incumbent if self.best else np.inf
         nodes = int(self.model.getNTotalNodes()) if begun else 0
         self.progress(Progress(nodes, self.incumbent, bound, gap, self.elapsed))
