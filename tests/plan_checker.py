@@ -270,14 +270,25 @@ def _bodies(p: Trajectory, ledger: Ledger) -> None:
 
 
 def _rest(p: Trajectory, ledger: Ledger) -> None:
-    """What the paper leaves open: rest at the start, on top of the ground, and at the end, on a foot."""
+    """What the paper leaves open: rest at the start, on top of the ground, and at the end, on a foot.
+
+    A plan that begins in motion says in which state.
+    """
     ledger.add("start", p.x[0, :2] - p.meta["start"], knot=0)
-    ledger.add("start", p.x[0, 2] - p.meta["com_height"] - p.p[0, :, 2].mean(), knot=0)
+    initial = p.meta.get("initial") or {}
+    if initial:
+        ledger.add("start", p.x[0] - initial["position"], knot=0)
+    else:
+        ledger.add("start", p.x[0, 2] - p.meta["com_height"] - p.p[0, :, 2].mean(), knot=0)
     for leg in range(4):
         ledger.add("start", max(plane.over(p.p[0, leg], ledger.tolerance) for plane in p.planes), leg, 0)
-    for name in ("v", "theta", "omega"):
-        ledger.add("start", getattr(p, name)[0], knot=0)
+    for name, stated in (("v", "velocity"), ("theta", "angles"), ("omega", "rates")):
+        ledger.add("start", getattr(p, name)[0] - initial.get(stated, np.zeros(3)), knot=0)
     options = p.meta["options"]
+    for leg in range(4):
+        ledger.add("start", p.p[0, leg] - initial.get("contacts", p.p[0])[leg], leg, 0)
+        if options["stance_between_swings"] and initial:
+            ledger.require("stance between swings", not (initial["swung"][leg] and p.S[leg, 0]), leg, 0)
     if options["final_stance"]:
         for name in ("v", "omega"):
             ledger.add("end at rest", getattr(p, name)[-1], knot=p.K)
@@ -317,6 +328,8 @@ def objective(plan: Any) -> float:
     p = plan if isinstance(plan, Trajectory) else Trajectory(plan)
     w, ground = p.meta["weights"], _ground(p)
     terms = {name: 0.0 for name in w}
+    initial = p.meta.get("initial")
+    before = initial["slot"] if initial else 0
     terms["goal"] = np.sum((p.x[-1, :2] - p.meta["goal"]) ** 2)
     terms["goal_angle"] = np.sum(p.theta[-1] ** 2)
     for k in range(p.K):
@@ -328,7 +341,7 @@ def objective(plan: Any) -> float:
         terms["angle"] += np.sum(p.theta[k + 1] ** 2)
         terms["angular_rate"] += np.sum(p.omega[k + 1] ** 2)
     for j in range(p.J):
-        terms["swing"] += (j + 1) * np.sum(p.S[:, j])
+        terms["swing"] += (before + j + 1) * np.sum(p.S[:, j])
     return float(sum(w[name] * terms[name] for name in w))
 
 

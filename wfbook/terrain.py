@@ -130,9 +130,15 @@ class Terrain:
         if not all(isinstance(region, Region) for region in self.regions):
             raise ValueError(f"regions: must be Region objects, is {show(self.regions)}")
 
-    def region_at(self, x: float, y: float) -> int | None:
-        """Index of the highest region at (x, y), the first of equals, or None over no region."""
-        over = [i for i, region in enumerate(self.regions) if region.contains(x, y)]
+    def region_at(self, x: float, y: float, tolerance: float = 1e-9) -> int | None:
+        """Index of the highest region at (x, y), the first of equals, or None over no region.
+
+        Args:
+            x: where to look.
+            y: likewise.
+            tolerance: how far outside of an edge still counts, in metres.
+        """
+        over = [i for i, region in enumerate(self.regions) if region.contains(x, y, tolerance)]
         return max(over, key=lambda i: self.regions[i].height(x, y), default=None)
 
     def height(self, x: float, y: float) -> float | None:

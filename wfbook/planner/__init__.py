@@ -11,12 +11,13 @@ nothing to find. :mod:`.polish` makes the result true, :mod:`.plan` keeps it.
 from wfbook.planner.explain import InfeasibleError, NoPlanError
 from wfbook.planner.plan import Plan
 from wfbook.planner.polish import polish, repaired, torque_mismatch
-from wfbook.planner.problem import Limits, Problem, Weights
+from wfbook.planner.problem import InitialState, Limits, Problem, Weights
 from wfbook.planner.solve import solve, solve_executable
 from wfbook.planner.tree import Progress
 
 __all__ = [
     "InfeasibleError",
+    "InitialState",
     "Limits",
     "NoPlanError",
     "Plan",

@@ -19,6 +19,7 @@ import cvxpy as cp
 import numpy as np
 
 from wfbook.friction import friction_pyramid, rolling_friction
+from wfbook.planner.bounds import MotionBounds
 from wfbook.planner.explain import InfeasibleError, NoPlanError, conflicting_groups
 from wfbook.planner.extract import plan_of, read
 from wfbook.planner.gait import Gait
@@ -217,7 +218,7 @@ def _regions(program: Program, dynamics: Dynamics, grid: Grid) -> None:
     """State eqs 22–24: a foot is on its region where slots end, a wheel on one of its group at all knots."""
     problem, ground, p = program.problem, program.problem.ground, program.p
     rho, rise = problem.knots_per_slot, problem.robot.swing_height
-    places = Places.of(problem, ground)
+    places = Places.of(problem, MotionBounds.of(problem))
     lowest, highest = _heights(problem)
     low = np.array([*places.low.min(axis=(1, 2)), lowest])
     high = np.array([*places.high.max(axis=(1, 2)), highest + rise])
@@ -317,7 +318,7 @@ def gait_of(program: Program) -> Gait:
 def solve(problem: Problem, gap: float, time_limit: float) -> Plan:
     """Give the paper's program to SCIP through CVXPY (see :func:`wfbook.planner.solve`)."""
     begin = time.perf_counter()
-    if (problem.start_regions < 0).any():
+    if not problem.start_in_reach:
         raise InfeasibleError(conflicting_groups(problem))
     program = build(problem)
     stated = cp.Problem(cp.Minimize(program.cost), program.rows())

@@ -13,7 +13,6 @@ from functools import cached_property
 import numpy as np
 
 from wfbook.planner.gait import Gait
-from wfbook.planner.ground import Places
 from wfbook.planner.problem import Problem
 
 
@@ -51,16 +50,17 @@ class Layout:
 class Boxes:
     """Boxes of one problem."""
 
-    def __init__(self, problem: Problem):
+    def __init__(self, problem: Problem, reachable: np.ndarray):
         """Lay the branching variables out.
 
         Args:
             problem: what is asked.
+            reachable: ``(R, L, J)`` whether a leg may be on a region when a slot ends.
         """
         self.problem, self.layout = problem, Layout.of(problem)
         self._members = np.array([[leg in p for p in problem.patterns] for leg in range(problem.legs)])
         ground = problem.ground
-        self._reachable = Places.of(problem, ground).reachable[ground.order]
+        self._reachable = reachable[ground.order]
         self._group = ground.group_of[ground.order]
         self._rank = np.argsort(ground.order)
 
@@ -72,7 +72,9 @@ class Boxes:
         upper[layout.T] = L * np.arange(1, J + 1)
         if self.problem.final_stance:
             upper[layout.S[:, -1]] = 0
-        if not self._reachable.any(axis=0).all() or (self.problem.start_regions < 0).any():
+        if self.problem.stance_between_swings:
+            upper[layout.S[self.problem.start_state.swung, 0]] = 0
+        if not self._reachable.any(axis=0).all() or not self.problem.start_in_reach:
             return None
         first = self._reachable.argmax(axis=0)
         last = len(self._reachable) - 1 - self._reachable[::-1].argmax(axis=0)
@@ -149,12 +151,12 @@ class Boxes:
         return True
 
     def _regions(self, lower: np.ndarray, upper: np.ndarray, S_low: np.ndarray, S_up: np.ndarray) -> bool:
-        """Propagate the ladder: its steps fall, and without a swing a foot stays and a wheel keeps its group."""
+        """Propagate the ladder: its steps fall; without a swing a foot stays and a wheel keeps its group."""
         layout, problem = self.layout, self.problem
         low, up = lower[layout.G], upper[layout.G]
         low[:] = np.maximum.accumulate(low[::-1], axis=0)[::-1]
         up[:] = np.minimum.accumulate(up, axis=0)
-        start = self._ladder(problem.start_regions)[:, :, None]
+        start = self.ladder(problem.start_regions)[:, :, None]
         low, up = np.concatenate([start, low], axis=2), np.concatenate([start, up], axis=2)
         fixed = np.ones_like(S_up, bool)
         if problem.wheels and problem.ground.rolls_over_edges:
@@ -180,7 +182,27 @@ class Boxes:
         lower[layout.G], upper[layout.G] = low[:, :, 1:], up[:, :, 1:]
         return True
 
-    def _ladder(self, region: np.ndarray) -> np.ndarray:
+    def nearest(self, lower: np.ndarray, upper: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Return the regions of a box that contacts are on, or nearest to.
+
+        Args:
+            lower: lower vector of the box.
+            upper: its upper vector.
+            points: ``(L, J, 2)`` contacts when slots end.
+
+        Returns:
+            ``(L, J)`` indices.
+        """
+        ground, G = self.problem.ground, self.layout.G
+        first, last = lower[G].sum(axis=0), upper[G].sum(axis=0)
+        outside = np.full((ground.count, *points.shape[:2]), np.inf)
+        for m, r in enumerate(ground.order):
+            A, b = ground.regions[r].halfspaces
+            allowed = self._reachable[m] & (first <= m) & (m <= last)
+            outside[m] = np.where(allowed, np.maximum((points @ A.T - b).max(axis=-1), 0.0), np.inf)
+        return ground.order[outside.argmin(axis=0)]
+
+    def ladder(self, region: np.ndarray) -> np.ndarray:
         """Return the steps of the ladder for region indices, ``(R−1, …)``."""
         steps = np.arange(1, len(self._rank)).reshape(-1, *[1] * np.ndim(region))
         return (steps <= self._rank[region]).astype(int)
@@ -200,7 +222,7 @@ class Boxes:
             z[self.layout.wheel] = gait.wheel
         z[self.layout.C] = np.cumsum(gait.S, axis=1)
         z[self.layout.T] = np.cumsum(gait.S.sum(axis=0))
-        z[self.layout.G] = self._ladder(gait.region)
+        z[self.layout.G] = self.ladder(gait.region)
         return z
 
     def of_modes(self, gait: Gait) -> tuple[np.ndarray, np.ndarray] | None:

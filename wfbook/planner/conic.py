@@ -167,7 +167,7 @@ class Boxed:
             conic: the program.
             columns: of the variables that will be bounded; a solution's ``y`` holds these only.
         """
-        self._offset, self._cutoff = conic.offset, np.inf
+        self._offset, self._cutoff, self._q = conic.offset, np.inf, conic.q
         self._columns = columns
         n = len(columns)
         pick = sparse.csc_matrix((np.ones(n), (np.arange(n), columns)), shape=(n, conic.A.shape[1]))
@@ -207,3 +207,23 @@ class Boxed:
             return Solution("cut", np.nan, cutoff, np.zeros(0))
         found = _read(result, self._offset)
         return replace(found, y=found.y[self._columns])
+
+    def minimise(self, lower: np.ndarray, upper: np.ndarray, linear: np.ndarray) -> tuple[float, float]:
+        """Minimise the cost plus a further linear one.
+
+        Args:
+            lower: bound of the box variable.
+            upper: likewise.
+            linear: coefficients of all variables of the program.
+
+        Returns:
+            A lower bound of the optimum, ``-inf`` without an answer, and the linear part at the minimiser.
+        """
+        self._solver.update(q=self._q + linear)
+        self._cutoff = np.inf
+        self._b[-2 * self._n : -self._n] = upper
+        self._b[-self._n :] = -lower
+        self._solver.update(b=self._b)
+        found = _read(self._solver.solve(), self._offset)
+        self._solver.update(q=self._q)
+        return (found.bound, float(linear @ found.y)) if found.status == "solved" else (-np.inf, 0.0)

@@ -16,6 +16,7 @@ import cvxpy as cp
 import numpy as np
 
 from wfbook.planner.gait import UNKNOWN, Gait
+from wfbook.planner.ground import Places
 from wfbook.planner.problem import Problem
 
 
@@ -25,6 +26,8 @@ class Contacts:
 
     Attributes:
         problem: what is asked.
+        regions: those that can be reached; the others have no variables.
+        groups: by index, the regions of each group that can be reached.
         foot_stance: by region, ``(L, J)``: the leg stands on its foot there.
         foot_landing: by region, ``(L, J)``: the leg swings and will land on its foot there.
         wheel_stance: by group, ``(L, J)``: the leg rolls on its wheel there.
@@ -39,6 +42,8 @@ class Contacts:
     """
 
     problem: Problem
+    regions: tuple[int, ...]
+    groups: dict[int, tuple[int, ...]]
     foot_stance: dict[int, Any]
     foot_landing: dict[int, Any]
     wheel_stance: dict[int, Any]
@@ -52,11 +57,12 @@ class Contacts:
     rows: list[Any] = field(default_factory=list)
 
     @classmethod
-    def of(cls, problem: Problem, inner_knots: bool) -> "Contacts":
+    def of(cls, problem: Problem, places: Places, inner_knots: bool) -> "Contacts":
         """State the flow.
 
         Args:
             problem: what is asked.
+            places: says which regions can be reached.
             inner_knots: whether to say where a rolling wheel is at the knots within a slot.
         """
         shape, ground = (problem.legs, problem.slots), problem.ground
@@ -64,9 +70,11 @@ class Contacts:
         def each(name: str, keys: Iterable[int], wanted: bool = True) -> dict[int, Any]:
             return {i: cp.Variable(shape, name=f"{name}{i}") for i in (keys if wanted else ())}
 
-        regions, groups = range(ground.count), range(len(ground.groups))
+        regions = places.used
+        groups = {g: tuple(r for r in m if r in regions) for g, m in enumerate(ground.groups)}
+        groups = {g: members for g, members in groups.items() if members}
         wheel_stance = each("wheel_stance", groups, problem.wheels)
-        shared = [r for r in regions if len(ground.groups[ground.group_of[r]]) > 1]
+        shared = [r for r in regions if len(groups[ground.group_of[r]]) > 1]
         # Alone in its group, a region is where the wheel is all the time: no variable of its own.
         alone = {r: wheel_stance[ground.group_of[r]] for r in regions if r not in shared and problem.wheels}
         inner = range(problem.knots_per_slot - 1 if inner_knots else 0)
@@ -86,6 +94,8 @@ class Contacts:
         rolling = total("rolling", wheel_stance.values())
         contacts = cls(
             problem,
+            regions,
+            groups,
             foot_stance=each("foot_stance", regions),
             foot_landing=foot_landing,
             wheel_stance=wheel_stance,
@@ -149,7 +159,7 @@ class Contacts:
 
     def _flow(self) -> None:
         """State eqs 16 and 17: a leg stands only where and on what it stood or landed the slot before."""
-        problem, ground = self.problem, self.problem.ground
+        problem = self.problem
         self.rows.append(self.feet + self.rolling + self.S == 1)
         own = {v.id: v for v in self.discrete().values() if v is not self.pattern}
         self.rows += [v >= 0 for v in own.values()]
@@ -159,8 +169,8 @@ class Contacts:
             self.rows.append(stance[:, :1] <= begin)
             self.rows.append(stance[:, 1:] <= stance[:, :-1] + self.foot_landing[r][:, :-1])
         for g, stance in self.wheel_stance.items():
-            begin = ((kinds == "wheel") & np.isin(regions, ground.groups[g])).astype(float)[:, None]
-            landed = sum(self.wheel_landing[r] for r in ground.groups[g])
+            begin = ((kinds == "wheel") & np.isin(regions, self.groups[g])).astype(float)[:, None]
+            landed = sum(self.wheel_landing[r] for r in self.groups[g])
             self.rows.append(stance[:, :1] <= begin)
             self.rows.append(stance[:, 1:] <= stance[:, :-1] + landed[:, :-1])
         if problem.stance_between_swings and problem.slots > 1:
@@ -171,7 +181,7 @@ class Contacts:
     def _pass(self) -> None:
         """State where rolling wheels are: in one region of their group, without turning back in a slot."""
         ground = self.problem.ground
-        for g, members in enumerate(ground.groups):
+        for g, members in self.groups.items():
             if len(members) == 1 or not self.problem.wheels:
                 continue
             stance = self.wheel_stance[g]

@@ -61,6 +61,10 @@ def conflicting_groups(problem: Problem) -> tuple[str, ...]:
     Returns:
         Names of groups; empty if the constraints do not contradict each other.
     """
+    if (problem.start_regions < 0).any():
+        return ("start", "regions")
+    if not problem.start_in_reach:
+        return ("start", "reach")
     program = tight.build(problem)
     soft = ("torque bounds", "torque", "rotation", "centroid")
     dropped = set(soft)

@@ -10,7 +10,7 @@ from wfbook.modes import END_EFFECTORS, LEGS
 from wfbook.planner.conic import Conic
 from wfbook.planner.gait import Gait
 from wfbook.planner.plan import Plan
-from wfbook.planner.problem import Limits, Problem, Weights
+from wfbook.planner.problem import InitialState, Limits, Problem, Weights
 from wfbook.planner.program import Program
 
 
@@ -31,9 +31,7 @@ def read(program: Program, bounds: bool = True) -> dict[str, list[np.ndarray]]:
     }
 
 
-def plan_of(
-    problem: Problem, values: dict[str, Any], gait: Gait, meta: dict[str, Any]
-) -> Plan:
+def plan_of(problem: Problem, values: dict[str, Any], gait: Gait, meta: dict[str, Any]) -> Plan:
     """Assemble a plan from the program's values.
 
     Args:
@@ -104,6 +102,7 @@ def describe(problem: Problem) -> dict[str, Any]:
         "goal": list(map(float, problem.goal)),
         "start": list(map(float, problem.start)),
         "start_end_effectors": list(problem.start_end_effectors),
+        "initial": None if problem.initial is None else _plain(problem.initial),
         "end_effectors": [e for e in END_EFFECTORS if e in problem.end_effectors],
         "knots_per_slot": problem.knots_per_slot,
         "mass": robot.mass,
@@ -126,6 +125,11 @@ def describe(problem: Problem) -> dict[str, Any]:
     }
 
 
+def _plain(state: InitialState) -> dict[str, Any]:
+    """Return a state ready for JSON."""
+    return {k: v.tolist() if isinstance(v, np.ndarray) else int(v) for k, v in vars(state).items()}
+
+
 def problem_of(plan: Plan) -> Problem:
     """Return the problem a plan answers, as its ``meta`` describes it.
 
@@ -134,6 +138,8 @@ def problem_of(plan: Plan) -> Problem:
     """
     meta = plan.meta
     try:
+        initial = InitialState(**meta["initial"]) if meta.get("initial") else None
+        contacts = plan.p[0] if initial is None else initial.contacts
         robot = Robot(
             mass=meta["mass"],
             inertia=np.array(meta["inertia"]),
@@ -152,8 +158,9 @@ def problem_of(plan: Plan) -> Problem:
             knots_per_slot=meta["knots_per_slot"],
             end_effectors=tuple(meta["end_effectors"]),
             start=tuple(meta["start"]),
-            start_offsets=plan.p[0, :, :2] - meta["start"] - robot.stance,
+            start_offsets=contacts[:, :2] - meta["start"] - robot.stance,
             start_end_effectors=tuple(meta["start_end_effectors"]),
+            initial=initial,
             robot=robot,
             weights=Weights(**meta["weights"]),
             limits=Limits(**limits),

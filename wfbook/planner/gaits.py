@@ -14,6 +14,7 @@ CRAWL = ((2,), (0,), (3,), (1,))
 
 _EXACT = 2  # gaits solved exactly in each round of the local search
 _ROUNDS = 6
+_DIVES = 400  # relaxations that a dive may take
 _BATCH = 8  # gaits bounded between two looks at the clock
 
 
@@ -57,7 +58,7 @@ def templates(problem: Problem) -> Iterator[Gait]:
 
 
 def neighbours(problem: Problem, gait: Gait) -> Iterator[Gait]:
-    """Yield gaits one small change away, their regions open: drop or shift a swing, change what it lands on."""
+    """Yield gaits one small change away: drop or shift a swing, change what it lands on; regions open."""
     S, wheel, _ = gait
     L, J = S.shape
     landed = [[(j, wheel[leg, j]) for j in np.flatnonzero(S[leg])] for leg in range(L)]
@@ -124,7 +125,9 @@ def improve(
         for i in range(0, len(fresh), _BATCH):
             if stop():
                 break
-            bounds += kernel.gait_bounds(fresh[i : i + _BATCH])
+            # Only the best few are wanted.
+            worth = min(below, sorted(bounds)[_EXACT - 1] if len(bounds) >= _EXACT else np.inf)
+            bounds += kernel.gait_bounds(fresh[i : i + _BATCH], worth)
         order = sorted(range(len(bounds)), key=lambda i: (bounds[i], i))
         return [fresh[i] for i in order if bounds[i] < below]
 
@@ -132,8 +135,55 @@ def improve(
     for _ in range(_ROUNDS):
         candidates = [*first, *templates(problem)] if current is None else neighbours(problem, current)
         tried = [g for g in kernel.complete(ranked(candidates, best)[:_EXACT]) if g is not None]
-        costs = kernel.price(tried)
+        costs = kernel.price(tried, best)
+        if current is None and not np.isfinite(min(costs, default=np.inf)):
+            tried = list(dive(kernel, stop))
+            costs = kernel.price(tried)
         if not costs or min(costs) >= best or stop():
             return
         best, current = min(costs), tried[int(np.argmin(costs))]
         yield best, current
+
+
+def dive(kernel: Kernel, stop: Callable[[], bool] = lambda: False) -> Iterator[Gait]:
+    """Yield a first gait that the relaxation leads to: slot by slot, each decision as it would have it.
+
+    Where a decision turns out impossible, the other way is taken: a depth-first search that spends no more
+    than a number of relaxations. It finds plans where common gaits miss the ground.
+
+    Args:
+        kernel: bounds of the problem.
+        stop: asked now and then; once true, nothing more is tried.
+    """
+    boxes, layout = kernel.boxes, kernel.boxes.layout
+    slots = np.full(layout.size, np.iinfo(int).max)
+    # Within a slot: who swings, then what it lands on, then where.
+    for rank, index in enumerate((layout.S, layout.wheel, layout.G)):
+        slots[index] = 3 * np.arange(kernel.problem.slots) + rank
+    stack = [box for box in [boxes.root()] if box is not None]
+    for _ in range(_DIVES):
+        if not stack or stop():
+            return
+        box = stack.pop()
+        found = kernel.bound(*box)
+        if found.status == "infeasible":
+            continue
+        if (box[0] == box[1]).all():
+            gait = boxes.gait(box[0])
+            if np.isfinite(kernel.price([gait])[0]):
+                yield gait
+                return
+            continue
+        z = found.y if found.status == "solved" else 0.5 * (box[0] + box[1])
+        open_ = np.flatnonzero((box[0] < box[1]) & (slots < np.iinfo(int).max))
+        if not len(open_):  # sums follow from what they sum
+            continue
+        first = open_[slots[open_] == slots[open_].min()]
+        index = first[np.argmax(np.abs(z[first] - 0.5))]
+        wanted = int(np.clip(np.rint(z[index]), box[0][index], box[1][index]))
+        for value in (1 - wanted, wanted):
+            lower, upper = box[0].copy(), box[1].copy()
+            lower[index] = upper[index] = value
+            child = boxes.propagate(lower, upper)
+            if child is not None:
+                stack.append(child)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from wfbook.planner.bounds import MotionBounds
 from wfbook.terrain import Region, Terrain
 
 _SAME = 1e-9
@@ -113,9 +114,9 @@ class GroundMap:
 
 def _plane(region: Region) -> tuple[float, float, float]:
     n, origin = region.normal, region.vertices.mean(axis=0)
-    a, b = -n[0] / n[2], -n[1] / n[2]
-    # Adding 0.0 turns −0.0 into 0.0, which prints and compares better.
-    return a + 0.0, b + 0.0, float(origin[2] - a * origin[0] - b * origin[1]) + 0.0
+    # Rounding errors as coefficients would look like slopes to a solver's presolve.
+    a, b = (0.0 if abs(part) < _SAME else -part / n[2] for part in n[:2])
+    return a, b, float(origin[2] - a * origin[0] - b * origin[1])
 
 
 def _surface(regions: tuple[Region, ...], members: tuple[int, ...]) -> Surface:
@@ -125,6 +126,7 @@ def _surface(regions: tuple[Region, ...], members: tuple[int, ...]) -> Surface:
         "wheel": (region.mu_wheel, region.mu_wheel_lateral),
     }
     basis = np.array([region.normal, region.tangent, region.binormal])
+    basis[np.abs(basis) < _SAME] = 0.0
     return Surface(members, basis, friction, region.rolling_resistance)
 
 
@@ -140,6 +142,7 @@ class Places:
         within: ``(R, 2, L, J)`` lower corners of the same, cut by each region's bounding box.
         upto: ``(R, 2, L, J)`` upper corners; below ``within`` where a region can't be reached.
         reachable: ``(R, L, J)`` whether leg l may be on region r when slot j ends.
+        started: regions under the legs at time 0.
     """
 
     ground: GroundMap
@@ -148,17 +151,19 @@ class Places:
     within: np.ndarray
     upto: np.ndarray
     reachable: np.ndarray
+    started: frozenset[int]
 
     @classmethod
-    def of(cls, problem: Any, ground: GroundMap) -> "Places":
-        """Work the boxes out for a problem."""
-        limits, robot = problem.limits, problem.robot
-        t = problem.slot_duration * np.arange(1, problem.slots + 1)
-        fastest = np.array([limits.speed[0], limits.lateral_speed])[:, None, None] * t
-        slowest = np.array([limits.speed[1], limits.lateral_speed])[:, None, None] * t
-        start = np.asarray(problem.start, float)[:, None, None]
-        low = start - slowest + robot.reach_lower[:, :2].T[..., None]
-        high = start + fastest + robot.reach_upper[:, :2].T[..., None]
+    def of(cls, problem: Any, bounds: MotionBounds) -> "Places":
+        """Work the boxes out.
+
+        Args:
+            problem: what is asked.
+            bounds: of the centre of mass.
+        """
+        ground, robot = problem.ground, problem.robot
+        low = bounds.place[0][:, None] + robot.reach_lower[:, :2].T[..., None]
+        high = bounds.place[1][:, None] + robot.reach_upper[:, :2].T[..., None]
         corners = [region.vertices[:, :2] for region in ground.regions]
         within = np.stack([np.maximum(low, c.min(axis=0)[:, None, None]) for c in corners])
         upto = np.stack([np.minimum(high, c.max(axis=0)[:, None, None]) for c in corners])
@@ -167,7 +172,7 @@ class Places:
             for a, b in zip(*region.halfspaces, strict=True):
                 least = sum(np.minimum(a[i] * within[r, i], a[i] * upto[r, i]) for i in range(2))
                 reachable[r] &= least <= b + _SAME
-        return cls(ground, low, high, within, upto, reachable)
+        return cls(ground, low, high, within, upto, reachable, frozenset(problem.start_regions.tolist()))
 
     def edges(self, region: int) -> list[tuple[np.ndarray, float]]:
         """Return the half-spaces ``a · p ≤ b`` of a region that its boxes do not imply already."""
@@ -180,13 +185,19 @@ class Places:
         return kept
 
     @cached_property
+    def used(self) -> tuple[int, ...]:
+        """The regions that some leg may be on at some time."""
+        return tuple(r for r in range(self.ground.count) if self.reachable[r].any() or r in self.started)
+
+    @cached_property
     def axes(self) -> tuple[int, ...]:
         """The axes, of x and y, along which it matters to a contact which region it is in."""
         free = (self.within <= self.low + _SAME) & (self.upto >= self.high - _SAME)
-        edges = [a for r in range(self.ground.count) for a, _ in self.edges(r)]
-        slopes = self.ground.planes[:, :2]
+        used = list(self.used)
+        edges = [a for r in used for a, _ in self.edges(r)]
+        slopes = self.ground.planes[used, :2]
         return tuple(
-            i for i in range(2) if slopes[:, i].any() or not free[:, i].all() or any(a[i] for a in edges)
+            i for i in range(2) if slopes[:, i].any() or not free[used, i].all() or any(a[i] for a in edges)
         )
 
     @cached_property

@@ -12,15 +12,17 @@ import numpy as np
 from scipy import sparse
 
 from wfbook.planner import relaxation, tight
+from wfbook.planner.bounds import MotionBounds, tightened
 from wfbook.planner.boxes import Boxes
 from wfbook.planner.conic import Boxed, Conic, Solution
 from wfbook.planner.contacts import assignment
 from wfbook.planner.crossings import Crossings
 from wfbook.planner.gait import UNKNOWN, Gait
+from wfbook.planner.ground import Places
 from wfbook.planner.presolve import solve_fixed
 from wfbook.planner.problem import Problem
 from wfbook.planner.program import Program
-from wfbook.planner.symmetry import mirror_row, mirror_symmetric
+from wfbook.planner.symmetry import MIRROR, mirror_row, mirror_symmetric
 from wfbook.planner.worker import Worker, available
 
 INTEGRAL = 1e-5
@@ -55,44 +57,100 @@ class Kernel:
 
     def __post_init__(self):
         problem = self.problem
-        self.boxes = Boxes(problem)
+        self._anywhere = MotionBounds.of(problem)
+        self.boxes = Boxes(problem, Places.of(problem, self._anywhere).reachable)
         self.program = tight.build(problem)
         self.conic = Conic.compile(self.program.cost, self.program.rows())
         self._discrete = np.concatenate(
             [self.conic.columns(v).ravel() for v in self.program.discrete.values()]
         )
         self._crossings = Crossings(self.program, self.conic)
-        relaxed = relaxation.build(problem)
-        contacts, order = relaxed.contacts, problem.ground.order
+        self._leaves: dict[bytes, Solution] = {}
         self._mirror = cp.Variable()
+        self._symmetric = mirror_symmetric(problem)
+        self._worker: Worker | None = None
+        self._shares = False
+        self._bound_within(self._anywhere)
+
+    def _bound_within(self, bounds: MotionBounds) -> None:
+        """Compile the relaxation for a motion within bounds, and forget what others said."""
+        problem, order = self.problem, self.problem.ground.order
+        self._motion = bounds
+        if self._worker is not None:
+            self.close()  # it knows the old programs
+        relaxed = relaxation.build(problem, bounds)
+        contacts = relaxed.contacts
         S, wheel, C = (cp.Variable(contacts.shape) for _ in range(3))
         T = cp.Variable(problem.slots)
         ladder = [cp.Variable(contacts.shape) for _ in order[1:]]
         rows = [*relaxed.constraints, S == contacts.S, self._mirror == mirror_row(S)]
         rows += [C[:, 0] == S[:, 0], C[:, 1:] == C[:, :-1] + S[:, 1:], cp.sum(C, axis=0) == T]
-        rows += [G == sum(map(contacts.occupancy, order[m:])) for m, G in enumerate(ladder, start=1)]
+        for m, G in enumerate(ladder, start=1):
+            behind = [contacts.occupancy(r) for r in order[m:] if r in contacts.regions]
+            rows.append(sum(behind) - G == 0 if behind else G == 0)
         box = [S, C, T, *ladder]
         if problem.wheels:
             rows.append(wheel == contacts.wheel)
             box.insert(1, wheel)
-        self._qp_conic = Conic.compile(relaxed.cost, rows)
-        self._columns = np.concatenate([self._qp_conic.columns(v).ravel() for v in box])
-        self._ladder = np.array([self._qp_conic.columns(v) for v in ladder], int)
+        conic = self._qp_conic = Conic.compile(relaxed.cost, rows)
+        self._columns = np.concatenate([conic.columns(v).ravel() for v in box])
+        self._places = [conic.columns(v)[:, 1:] for v in relaxed.places]
+        self._x = conic.columns(relaxed.x)
         discrete = contacts.discrete()
-        self._qp_discrete = np.concatenate([self._qp_conic.columns(v).ravel() for v in discrete.values()])
+        self._qp_discrete = np.concatenate([conic.columns(v).ravel() for v in discrete.values()])
         self._qp_keys = list(discrete)
         self._qp = Boxed(self._symmetry_broken(), self._columns)
         self._bounds: dict[bytes, Solution] = {}
-        self._leaves: dict[bytes, Solution] = {}
         # Sum of relative gains, and how many were seen, for each variable down and up.
         self._gain = np.zeros((2, self.boxes.layout.size))
         self._seen = np.zeros((2, self.boxes.layout.size))
-        self._worker: Worker | None = None
+        self._fork()
+
+    def tighten(self, cutoff: float, stop: Callable[[], bool] = lambda: False) -> None:
+        """Narrow the motion to that of plans cheaper than a cutoff; from then on bounds hold for those only.
+
+        Args:
+            cutoff: of the cost. On a single region it narrows too little to be worth a new program.
+            stop: asked now and then; once true, what is not narrowed yet stays as it is.
+        """
+        root = self.boxes.root()
+        if root is None or self.problem.ground.count == 1:
+            return
+        base = self.bound(*root).bound
+        n, rho = self._qp_conic.A.shape[1], self.problem.knots_per_slot
+        ends = self._x[rho::rho]
+        begins = self._x[:-1:rho]
+
+        def rows(plus: np.ndarray, minus: np.ndarray) -> np.ndarray:
+            result, j = np.zeros((len(ends), n)), np.arange(len(ends))[:, None]
+            np.add.at(result, (j, plus), 1.0 / plus.shape[1])
+            np.add.at(result, (j, minus), -1.0)
+            return result
+
+        none = np.zeros((len(ends), 0), int)
+        quantities = {"place": rows(ends[:, None], none)}
+        if self.problem.wheels:
+            quantities["travel"] = rows(ends[:, None], begins[:, None])
+            quantities["drift"] = rows(self._x[1:].reshape(-1, rho), begins[:, None])
+
+        def minimise(linear: np.ndarray) -> tuple[float, float]:
+            self.qps += 1
+            return self._qp.minimise(*(side.astype(float) for side in root), linear)
+
+        self._bound_within(tightened(self._anywhere, quantities, minimise, base, cutoff, stop))
+        self.boxes = Boxes(self.problem, Places.of(self.problem, self._motion).reachable)
+        self.pruned = min(self.pruned, cutoff)
+
+    def relax(self) -> None:
+        """Take back what :meth:`tighten` did."""
+        if self._motion is not self._anywhere:
+            self._bound_within(self._anywhere)
+            self.boxes = Boxes(self.problem, Places.of(self.problem, self._anywhere).reachable)
 
     def _symmetry_broken(self) -> Conic:
         """Return the QP with one of each pair of mirror images cut off, where the problem has them."""
         conic = self._qp_conic
-        if not mirror_symmetric(self.problem):
+        if not self._symmetric:
             return conic
         n = conic.A.shape[1]
         row = sparse.csc_matrix(([-1.0], ([0], [int(conic.columns(self._mirror))])), shape=(1, n))
@@ -100,7 +158,11 @@ class Kernel:
 
     def open(self) -> None:
         """Start the worker process, if there is a second core for it; results are the same without."""
-        if self._worker is None and available():
+        self._shares = available()
+        self._fork()
+
+    def _fork(self) -> None:
+        if self._worker is None and self._shares:
             self._worker = Worker(self._work)
 
     def close(self) -> None:
@@ -176,7 +238,7 @@ class Kernel:
         return self._leaves[key]
 
     def price(self, gaits: list[Gait], cutoff: float = np.inf) -> list[float]:
-        """Return the exact costs of gaits; infinite where infeasible, excluded or known to exceed a cutoff."""
+        """Return exact costs of gaits; infinite where infeasible, excluded or known to exceed a cutoff."""
         fresh = [g for g in gaits if g.key not in self._leaves and g.key not in self.excluded]
         found = self._shared(self._exact, [(g, cutoff) for g in fresh])
         for gait, solution in zip(fresh, found, strict=True):
@@ -189,7 +251,7 @@ class Kernel:
         self.leaves += 1
         self._leaves[gait.key] = found
         if found.status == "failed":
-            self.pruned = min(self.pruned, self._gait_bound(gait))
+            self.pruned = min(self.pruned, self._gait_qp(gait).bound)
         elif found.status != "infeasible":
             self.pruned = min(self.pruned, found.bound)
 
@@ -216,30 +278,37 @@ class Kernel:
         found = solve_fixed(self.conic, self._discrete[chosen], fixed[chosen])
         if found.status != "solved":
             return found, None
-        shares = [self._occupied(r, gait, found.y) for r in range(self.problem.ground.count)]
-        rounded = gait._replace(region=np.where(known, gait.region, np.argmax(shares, axis=0)))
+        rho = self.problem.knots_per_slot
+        p = [self.conic.value(c, found.y)[rho::rho].T for c in self.program.p[:2]]
+        region = self.boxes.nearest(lower, upper, np.stack(p, axis=-1))
+        # Between swings a foot stays where it landed.
+        for j in range(1, gait.S.shape[1]):
+            stays = (gait.S[:, j] == 0) & (gait.wheel[:, j] == 0)
+            region[stays, j] = region[stays, j - 1]
+        rounded = gait._replace(region=np.where(known, gait.region, region))
         return found, rounded if self.boxes.admissible(rounded) else None
-
-    def _occupied(self, region: int, gait: Gait, y: np.ndarray) -> np.ndarray:
-        """Return to which part the contacts are in a region when slots end, ``(L, J)``."""
-        keys = [(name, region) for name in ("foot stance", "foot landing", "wheel landing", "zone")]
-        if ("zone", region) not in self.program.discrete:
-            keys[-1] = ("wheel stance", int(self.problem.ground.group_of[region]))
-        parts = [self.program.discrete[k] for k in keys if k in self.program.discrete]
-        return sum(self.conic.value(v, y) for v in parts)
 
     def priced(self) -> list[Gait]:
         """Return the feasible gaits that were solved exactly, the cheapest first."""
         feasible = [(found.value, key) for key, found in self._leaves.items() if found.status == "solved"]
         return [Gait.from_key(key, self.problem.legs) for _, key in sorted(feasible)]
 
-    def gait_bounds(self, gaits: list[Gait]) -> list[float]:
-        """Return the QP's lower bounds of the costs of gaits, whose regions may be open."""
-        self.qps += len(gaits)
-        return self._shared(self._gait_bound, [(gait,) for gait in gaits])
+    def gait_bounds(self, gaits: list[Gait], cutoff: float = np.inf) -> list[float]:
+        """Return the relaxation's lower bounds of the costs of gaits, whose regions may be open.
 
-    def _gait_bound(self, gait: Gait) -> float:
-        return self._gait_qp(gait).bound
+        Args:
+            gaits: none of them impossible (see :meth:`.boxes.Boxes.of_modes`).
+            cutoff: a bound may be no better than this.
+        """
+        self.qps += len(gaits)
+        boxes = [self.boxes.of_modes(self._kept(gait)) for gait in gaits]
+        return [found.bound for found in self._shared(self._solve, [(*box, cutoff) for box in boxes])]
+
+    def _kept(self, gait: Gait) -> Gait:
+        """Return the gait or its mirror image, whichever the relaxation keeps."""
+        if self._symmetric and mirror_row(gait.S) < 0:
+            return Gait(*(part[list(MIRROR)] for part in gait.open()))
+        return gait
 
     def _gait_qp(self, gait: Gait) -> Solution:
         assigned = assignment(self.problem, gait, self._qp_keys)
@@ -271,14 +340,13 @@ class Kernel:
             found = self._gait_qp(partial)
             if found.status != "solved":
                 return None
-            wanted = np.rint(found.y[self._ladder]).astype(int)
-            # The first slot that is open, and with it what the QP has decided anyway.
+            # The first slot that is open is decided by where its contacts are; the next QP adapts the rest.
             slot = np.flatnonzero(~known.all(axis=0))[0]
-            sure = np.abs(found.y[self._ladder] - wanted).max(axis=0) < INTEGRAL
-            take = ~known & (np.arange(known.shape[1]) == slot) | (~known & sure)
+            wanted = self.boxes.nearest(lower, upper, np.stack([found.y[at] for at in self._places], axis=-1))
+            take = ~known & (np.arange(known.shape[1]) == slot)
             lower, upper = lower.copy(), upper.copy()
-            for at, values in ((lower, wanted), (upper, wanted)):
-                at[G] = np.where(take, np.clip(values, lower[G], upper[G]), at[G])
+            steps = self.boxes.ladder(wanted)
+            lower[G], upper[G] = np.where(take, steps, lower[G]), np.where(take, steps, upper[G])
             box = self.boxes.propagate(lower, upper)
         return None
 

@@ -1,8 +1,9 @@
 """What is asked of the planner: terrain, goal, time, end effectors, weights and limits."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any, Self
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from wfbook.centroidal import Robot
 from wfbook.modes import DIAGONAL_PATTERNS, END_EFFECTORS, LEGS
 from wfbook.planner.ground import GroundMap
 from wfbook.terrain import Terrain
+
+_SAME = 1e-9  # what rounding may leave between two ways of saying the same place
+_ON_GROUND = 1e-6  # how far a solver may leave a contact from the ground it stands on
 
 
 @dataclass(frozen=True)
@@ -21,7 +25,8 @@ class Weights:
     + Σ_{k≥1} (angle ‖θ_k‖² + angular_rate ‖ω_k‖² + height (x_k,z − h)²)
     + Σ_k (acceleration ‖a_k‖² + force Σ_l ‖F_kl‖² + bounds Σ_l,i (U⁺ + U⁻)_kli / (m g)
     + centroid ‖x_{k+1} − c_k‖²) + swing Σ_lj (j + 1) S_lj`` with ``j`` from 0. The goal's and the
-    centroid's norms are horizontal. The terms in angle, angular rate and height are not in the
+    centroid's norms are horizontal; a problem that begins in motion counts ``j`` from where the whole
+    motion began. The terms in angle, angular rate and height are not in the
     paper: without them rotation rings at ± 6 rad/s and the levers in U make the robot crouch.
     """
 
@@ -60,6 +65,44 @@ class Limits:
 
 
 @dataclass(frozen=True)
+class InitialState:
+    """A state between two slots, for a problem that begins in motion.
+
+    What each leg carries is not in it: that is ``Problem.start_end_effectors``, as at rest.
+
+    Attributes:
+        position: ``(3,)`` of the centre of mass.
+        velocity: ``(3,)`` its velocity.
+        angles: ``(3,)`` roll, pitch and yaw.
+        rates: ``(3,)`` their rates.
+        contacts: ``(L, 3)`` contact point of each leg, on the ground.
+        swung: ``(L,)`` bool: the leg swung in the slot before.
+        slot: number of slots that went before; swings are priced by their place in the whole motion.
+
+    Raises:
+        ValueError: a field is wrong; the message names it.
+    """
+
+    position: np.ndarray
+    velocity: np.ndarray
+    angles: np.ndarray
+    rates: np.ndarray
+    contacts: np.ndarray
+    swung: np.ndarray
+    slot: int = 0
+
+    def __post_init__(self):
+        shapes = dict.fromkeys(("position", "velocity", "angles", "rates"), (3,))
+        for name, shape in (shapes | {"contacts": (len(LEGS), 3), "swung": (len(LEGS),)}).items():
+            value = np.asarray(getattr(self, name), bool if name == "swung" else float)
+            if value.shape != shape or not np.isfinite(value).all():
+                raise ValueError(f"initial: {name} is not a finite array of shape {shape}")
+            object.__setattr__(self, name, value)
+        if isinstance(self.slot, bool) or not isinstance(self.slot, int | np.integer) or self.slot < 0:
+            raise ValueError(f"initial: slot {self.slot!r} is not a whole number of at least 0")
+
+
+@dataclass(frozen=True)
 class Problem:
     """A planning problem (Paper A, section II).
 
@@ -70,9 +113,11 @@ class Problem:
         slot_duration: of one slot, in seconds.
         knots_per_slot: the paper's ρ.
         end_effectors: what a leg may carry: ``("foot",)`` or ``("foot", "wheel")``.
-        start: ``(x, y)`` of the centre of mass at time 0, at rest.
+        start: ``(x, y)`` of the centre of mass at time 0.
         start_offsets: ``(L, 2)`` displacement of each contact from its nominal place at time 0.
         start_end_effectors: what each leg carries before slot 0; default feet.
+        initial: where the robot begins in motion; it must agree with ``start`` and ``start_offsets``
+            (:meth:`begun` sees to that). Default: at rest at its nominal height.
         patterns: sets of legs that may swing together.
         stance_between_swings: a leg that landed must stand for a slot before it swings again.
         final_stance: all legs stand in the last slot, at rest, one of them on a foot.
@@ -94,6 +139,7 @@ class Problem:
     start: tuple[float, float] = (0.0, 0.0)
     start_offsets: np.ndarray = field(default_factory=lambda: np.zeros((len(LEGS), 2)))
     start_end_effectors: Sequence[str] = ("foot",) * len(LEGS)
+    initial: InitialState | None = None
     patterns: Sequence[tuple[int, ...]] = DIAGONAL_PATTERNS
     stance_between_swings: bool = True
     final_stance: bool = True
@@ -130,6 +176,19 @@ class Problem:
                 f"patterns: {self.patterns!r}, expected sets of legs 0 to 3, the empty one among them"
             )
         self._check_goal()
+        if self.initial is not None:
+            self._check_initial(self.initial)
+
+    def _check_initial(self, initial: InitialState):
+        """Refuse a state that contradicts the fields that hold without one, or floats."""
+        if np.abs(initial.position[:2] - self.start).max() > _SAME:
+            raise ValueError(f"initial: position {initial.position} is not over start {tuple(self.start)}")
+        if np.abs(initial.contacts[:, :2] - self.start_contacts).max() > _SAME:
+            raise ValueError("initial: contacts are not where start and start_offsets put them")
+        regions = self.terrain.regions
+        for leg, (r, (x, y, z)) in enumerate(zip(self.start_regions, initial.contacts, strict=True)):
+            if r >= 0 and abs(z - regions[r].height(x, y)) > _ON_GROUND:
+                raise ValueError(f"initial: the contact of {LEGS[leg]} is not on the ground")
 
     def _check_goal(self):
         """Refuse a goal that no plan comes near."""
@@ -172,6 +231,53 @@ class Problem:
         return "wheel" in self.end_effectors
 
     @property
+    def start_state(self) -> InitialState:
+        """The state at time 0: ``initial``, or rest at the nominal height above the contacts."""
+        if self.initial is not None:
+            return self.initial
+        contacts = np.column_stack([self.start_contacts, self.start_heights])
+        place = np.array([*self.start, self.start_heights.mean() + self.robot.height])
+        return InitialState(place, *np.zeros((3, 3)), contacts, np.zeros(self.legs, bool))
+
+    @property
+    def slot_numbers(self) -> np.ndarray:
+        """``(J,)`` numbers of the slots, from 1 where the whole motion began: the price of a swing."""
+        before = 0 if self.initial is None else self.initial.slot
+        return before + np.arange(1, self.slots + 1)
+
+    def begun(self, initial: InitialState, end_effectors: Sequence[str], **changes: Any) -> Self:
+        """Return the problem as it is from a state on.
+
+        Args:
+            initial: where it begins; contacts that a solver left a little outside their region are moved in.
+            end_effectors: what each leg carries there.
+            changes: other fields to change.
+        """
+        contacts = np.array([self._moved_in(*contact) for contact in initial.contacts])
+        initial = replace(initial, contacts=contacts)
+        offsets = contacts[:, :2] - initial.position[:2] - self.robot.stance
+        return replace(
+            self,
+            start=tuple(map(float, initial.position[:2])),
+            start_offsets=offsets,
+            start_end_effectors=tuple(end_effectors),
+            initial=initial,
+            **changes,
+        )
+
+    def _moved_in(self, x: float, y: float, z: float) -> np.ndarray:
+        """Return a contact moved onto and into the region it is on, if solver's tolerance left it outside."""
+        point, index = np.array([x, y]), self.terrain.region_at(x, y, _ON_GROUND)
+        if index is None:
+            return np.array([x, y, z])
+        region = self.terrain.regions[index]
+        A, b = region.halfspaces
+        for normal, limit in zip(A, b, strict=True):
+            point = point - max(normal @ point - limit, 0.0) * normal
+        height = region.height(*point)
+        return np.array([*point, height if abs(height - z) <= _ON_GROUND else z])
+
+    @property
     def start_contacts(self) -> np.ndarray:
         """``(L, 2)`` contact points at time 0."""
         return np.asarray(self.start, float) + self.robot.stance + self.start_offsets
@@ -179,17 +285,24 @@ class Problem:
     @cached_property
     def start_regions(self) -> np.ndarray:
         """``(L,)`` index of the region under each leg at time 0, the highest; -1 where there is none."""
-        found = [self.terrain.region_at(*place) for place in self.start_contacts]
+        found = [self.terrain.region_at(*place, _ON_GROUND) for place in self.start_contacts]
         return np.array([-1 if region is None else region for region in found])
 
     @property
     def start_heights(self) -> np.ndarray:
         """``(L,)`` height of the ground under each leg at time 0; NaN where there is none."""
+        if self.initial is not None:
+            return self.initial.contacts[:, 2]
         places = zip(self.start_contacts, self.start_regions, strict=True)
         regions = self.terrain.regions
         return np.array([regions[r].height(*place) if r >= 0 else np.nan for place, r in places])
 
     @property
-    def start_height(self) -> float:
-        """Height of the centre of mass at time 0: the nominal one above the mean of the contacts."""
-        return float(self.start_heights.mean()) + self.robot.height
+    def start_in_reach(self) -> bool:
+        """Whether every leg has ground under it at time 0, within its reach box (eq. 30)."""
+        if (self.start_regions < 0).any():
+            return False
+        state, robot = self.start_state, self.robot
+        lever = state.contacts - state.position
+        above = (lever >= robot.reach_lower - _ON_GROUND).all()
+        return bool(above and (lever <= robot.reach_upper + _ON_GROUND).all())

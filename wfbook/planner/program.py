@@ -157,23 +157,25 @@ def common(
             program.add("torque bounds", *_above_squares(u, pair, per_leg))
 
     robot, limits = problem.robot, problem.limits
-    ones = np.ones((K + 1, 1))
-    for i in range(3):
-        program.add(
-            "reach", lever[i] >= ones * robot.reach_lower[:, i], lever[i] <= ones * robot.reach_upper[:, i]
-        )
+    ones = np.ones((K, 1))
+    for i in range(3):  # the start is as it is
+        low, high = ones * robot.reach_lower[:, i], ones * robot.reach_upper[:, i]
+        program.add("reach", lever[i][1:] >= low, lever[i][1:] <= high)
     program.add("speed", v[0] <= limits.speed[0], v[0] >= -limits.speed[1])
     program.add("speed", *(side for i in (1, 2) for side in within(v[i], limits.lateral_speed)))
     program.add("speed", *(side for angle in theta for side in within(angle, limits.angle)))
 
-    place = (*problem.start, problem.start_height)
-    program.add(
-        "start",
-        *(x[i][0] == place[i] for i in range(3)),
-        *(p[i][0] == problem.start_contacts[:, i] for i in (0, 1)),
-        p[2][0] == problem.start_heights,
-    )
-    program.add("start", *(z[0] == 0 for z in (*v, *theta, *omega)))
+    state = problem.start_state
+    program.add("start", *(p[i][0] == state.contacts[:, i] for i in range(3)))
+    for vector, value in (
+        (x, state.position),
+        (v, state.velocity),
+        (theta, state.angles),
+        (omega, state.rates),
+    ):
+        program.add("start", *(vector[i][0] == value[i] for i in range(3)))
+    if problem.stance_between_swings and state.swung.any():
+        program.add("modes", S[np.flatnonzero(state.swung), 0] == 0)
     if problem.final_stance:
         program.add("end", *(z[K] == 0 for z in (*v, *omega)), S[:, -1] == 0)
         nominal = robot.stance
@@ -220,6 +222,6 @@ def motion_cost(program: Program) -> Any:
         w.height * cp.sum_squares(rise[1:]),
         w.angle * sum(cp.sum_squares(angle[1:]) for angle in program.theta),
         w.angular_rate * sum(cp.sum_squares(rate[1:]) for rate in program.omega),
-        w.swing * cp.sum(program.S @ np.arange(1, problem.slots + 1)),
+        w.swing * cp.sum(program.S @ problem.slot_numbers),
     ]
     return sum(terms)

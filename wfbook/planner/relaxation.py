@@ -3,8 +3,7 @@
 The search solves hundreds of relaxations, so they must be cheap. This one is a QP: rotation is
 dropped, but the squares that bound the torque (eq. 9) stay in the cost, for ``U⁺ + U⁻`` is never less
 than the sum of its squares. It knows feet only where slots begin and end, and forces only by their
-sum over legs. Where the ground is not one level plane,
-the height above it costs what it costs at best. Each shortening is a bound:
+sum over legs. Each shortening is a bound:
 
 * ``Σ_k r_k² ≥ ρ r̄²`` with the mean over a slot's knots, for levers and for the centroid;
 * ``Σ_l F_l² ≥ N²/m`` for ``m`` standing legs that carry ``N`` together, which is split by the number
@@ -20,6 +19,7 @@ import numpy as np
 
 from wfbook.centroidal import GRAVITY, midpoint_integration
 from wfbook.friction import friction_pyramid
+from wfbook.planner.bounds import MotionBounds
 from wfbook.planner.contacts import Contacts
 from wfbook.planner.ground import Places, Surface
 from wfbook.planner.problem import Problem
@@ -36,47 +36,60 @@ class Relaxation:
         cost: a lower bound of eq. 31.
         constraints: of the QP.
         contacts: its discrete variables.
+        x: of the centre of mass, ``(K+1,)``.
+        places: of the contacts when slots end, x and y, each ``(L, J+1)``.
     """
 
     cost: Any
     constraints: list[Any]
     contacts: Contacts
+    x: Any
+    places: list[Any]
 
 
-def build(problem: Problem) -> Relaxation:
-    """State the QP for a problem, with binaries relaxed to ``[0, 1]``."""
-    J, K, rho, dt = problem.slots, problem.knots, problem.knots_per_slot, problem.dt
+def build(problem: Problem, bounds: MotionBounds) -> Relaxation:
+    """State the QP for a problem, with binaries relaxed to ``[0, 1]``.
+
+    Args:
+        problem: what is asked.
+        bounds: of the centre of mass; if they hold for plans below some cost only, so does the QP.
+    """
+    J, K, dt = problem.slots, problem.knots, problem.dt
     w, robot, limits, ground = problem.weights, problem.robot, problem.limits, problem.ground
-    contacts = Contacts.of(problem, inner_knots=False)
+    places = Places.of(problem, bounds)
+    contacts = Contacts.of(problem, places, inner_knots=False)
     S = contacts.S
     constraints = list(contacts.rows)
-    cost = w.swing * cp.sum(S @ np.arange(1, J + 1))
+    cost = w.swing * cp.sum(S @ problem.slot_numbers)
 
     x, v, a = ([cp.Variable(n) for _ in range(3)] for n in (K + 1, K + 1, K))
     rise = x[2]
-    x[2] = problem.start_height + rise
-    place = (*problem.start, problem.start_height)
+    state = problem.start_state
+    x[2] = state.position[2] + rise
     constraints += [r == 0 for r in midpoint_integration(x, v, a, dt)]
-    constraints += [x[i][0] == place[i] for i in range(3)] + [v[i][0] == 0 for i in range(3)]
+    constraints += [x[i][0] == state.position[i] for i in range(3)]
+    constraints += [v[i][0] == state.velocity[i] for i in range(3)]
     constraints += [v[0] <= limits.speed[0], v[0] >= -limits.speed[1]]
     if problem.final_stance:
         constraints += [v[i][K] == 0 for i in range(3)] + [S[:, -1] == 0]
     cost += w.goal * sum(cp.square(x[i][K] - problem.goal[i]) for i in range(2))
     cost += w.acceleration * sum(cp.sum_squares(a[i]) for i in range(3))
 
-    places = Places.of(problem, ground)
     shares, rows = region_shares(contacts, places)
     constraints += rows
     if ground.level is not None:
-        constraints += within(rise, robot.reach[2])
-        cost += w.height * cp.sum_squares(rise) + _vertical_levers(problem, x[2], contacts.sizes)
+        clearance = x[2] - ground.level - robot.height
+        constraints += within(clearance[1:], robot.reach[2])
+        cost += w.height * cp.sum_squares(clearance[1:]) + _vertical_levers(problem, x[2], contacts.sizes)
     else:
-        constraints += _reach_down(contacts, shares, x[2][rho::rho])
-        cost += _best_heights(problem) @ cp.sum(contacts.sizes, axis=1)
-    for part, rows in (_forces(contacts, a), _levers(contacts, x, shares)):
+        part, rows = _heights(contacts, shares, x[2])
+        cost += part
+        constraints += rows
+    ends = [cp.Variable((problem.legs, J + 1)) for _ in range(2)]
+    for part, rows in (_forces(contacts, a), _levers(contacts, x, ends, shares, bounds)):
         cost = cost + part
         constraints += rows
-    return Relaxation(cost, constraints, contacts)
+    return Relaxation(cost, constraints, contacts, x[0], ends)
 
 
 def _forces(contacts: Contacts, a: list[Any]) -> tuple[Any, list[Any]]:
@@ -150,10 +163,11 @@ def _on_surfaces(
     problem = contacts.problem
     most, total, drag, rows, wheels = problem.limits.force, [0, 0, 0], [0, 0, 0], [], 0
     for surface in problem.ground.surfaces:
-        for e in problem.end_effectors:
+        used = [r for r in surface.regions if r in contacts.regions]
+        for e in problem.end_effectors if used else ():
             n, t, b = (cp.Variable(problem.knots) for _ in range(3))
             rows += [side <= 0 for side in friction_pyramid(n, t, b, *surface.friction[e])]
-            rows.append(n <= most * (spread @ cp.sum(_carrying(contacts, e, surface), axis=0)))
+            rows.append(n <= most * (spread @ cp.sum(_carrying(contacts, e, used), axis=0)))
             for force, direction in zip((n, t, b), surface.basis, strict=True):
                 total = [c + d * force if d else c for c, d in zip(total, direction, strict=True)]
             if e == "wheel":
@@ -167,19 +181,19 @@ def _on_surfaces(
     return *total, rows
 
 
-def _carrying(contacts: Contacts, end_effector: str, surface: Surface) -> Any:
-    """Return an upper bound of which legs may push on a surface during a slot, ``(L, J)``.
+def _carrying(contacts: Contacts, end_effector: str, regions: list[int]) -> Any:
+    """Return an upper bound of which legs may push on some regions during a slot, ``(L, J)``.
 
     A wheel that crosses an edge pushes on both sides of it, and if it can pass a whole region within a
     slot, on what its ends do not show.
     """
     if end_effector == "foot":
-        return sum(contacts.foot_stance[r] for r in surface.regions)
+        return sum(contacts.foot_stance[r] for r in regions)
     problem, ground = contacts.problem, contacts.problem.ground
     farthest = max(problem.limits.speed) * problem.slot_duration
     total = 0
-    for g, members in enumerate(ground.groups):
-        inside = [r for r in members if r in surface.regions]
+    for g, members in contacts.groups.items():
+        inside = [r for r in members if r in regions]
         short = any(np.ptp(ground.regions[r].vertices[:, 0]) <= farthest for r in inside)
         if set(members) <= set(inside) or (inside and short):
             total = total + contacts.wheel_stance[g]
@@ -188,36 +202,54 @@ def _carrying(contacts: Contacts, end_effector: str, surface: Surface) -> Any:
     return total
 
 
-def _reach_down(contacts: Contacts, shares: dict, z: Any) -> list[Any]:
-    """State eq. 30 vertically where slots end, on ground that is not one level plane."""
-    problem, heights = contacts.problem, 0
-    for r, (*slopes, constant) in enumerate(problem.ground.planes):
+def _heights(contacts: Contacts, shares: dict, z: Any) -> tuple[Any, list[Any]]:
+    """Bound the cost of heights on ground that is not one level plane; state eq. 30 vertically at slot ends.
+
+    The mean height of the ground under the legs follows the splines between slot ends (eq. 5), but for
+    legs that roll, which are given what slopes and speed allow. ``Σ_l r_z² ≥ L mean²``.
+
+    Returns:
+        The cost, and constraints.
+    """
+    problem, w, robot, heights = contacts.problem, contacts.problem.weights, contacts.problem.robot, 0
+    J, K, L, rho, grid = problem.slots, problem.knots, problem.legs, problem.knots_per_slot, Grid.of(problem)
+    for r in contacts.regions:
+        *slopes, constant = problem.ground.planes[r]
         heights = heights + constant * contacts.occupancy(r)
         heights = heights + sum(slopes[i] * part for i, part in shares[r].items() if slopes[i])
-    lever = heights - np.ones((problem.legs, 1)) @ cp.reshape(z, (1, problem.slots), order="C")
-    low, high = problem.robot.reach_lower[0, 2], problem.robot.reach_upper[0, 2]
-    return [lever >= low, lever <= high]
+    lever = heights - np.ones((L, 1)) @ cp.reshape(z[rho::rho], (1, J), order="C")
+    rows = [lever >= robot.reach_lower[0, 2], lever <= robot.reach_upper[0, 2]]
+
+    # The clearance is the height above the mean of the ground, less the nominal one.
+    ground, clearance = cp.Variable(J + 1), cp.Variable(K + 1)
+    rows += [ground[0] == problem.start_heights.mean(), ground[1:] == cp.sum(heights, axis=0) / L]
+    between = grid.spread @ np.eye(J, J + 1) + grid.climb @ (np.eye(J, J + 1, 1) - np.eye(J, J + 1))
+    above = z[1:] - robot.height - between @ ground
+    if problem.wheels and problem.ground.steepest > 0:
+        rolled = cp.Variable(K)
+        inner = grid.age < rho
+        farthest = problem.ground.steepest * max(problem.limits.speed) * problem.slot_duration / L * inner
+        rows += within(rolled, cp.multiply(farthest, grid.spread @ cp.sum(contacts.rolling, axis=0)))
+        above = above + rolled
+    first = problem.start_state.position[2] - problem.start_heights.mean() - robot.height
+    rows += [clearance[0] == first, clearance[1:] == above]
+    bump, n = _bumps(problem), np.arange(contacts.sizes.shape[0])
+    swinging = grid.spread @ (contacts.sizes.T @ n)
+    middle = 0.5 * (clearance[1:] + clearance[:-1]) + robot.height
+    levers = cp.sum_squares(np.sqrt(L) * middle - cp.multiply(bump, swinging) / np.sqrt(L))
+    return w.height * cp.sum_squares(clearance) + 4 * w.bounds * levers, rows
 
 
-def _best_heights(problem: Problem) -> np.ndarray:
-    """Return the least that height and vertical levers cost a slot in which n legs swing, ``(N,)``.
-
-    The mean over legs of the vertical lever at mid-interval is ``h n/L − m`` for a height m above the
-    ground; ``Σ_l r² ≥ L mean²``, and the height term of eq. 31 is at least ``Σ_k (m_k − h₀)²`` over
-    mid-intervals, for the first of its knots costs nothing.
-    """
-    L, rho, w, robot = problem.legs, problem.knots_per_slot, problem.weights, problem.robot
-    profile = robot.swing_height * septic_basis(np.arange(rho + 1) / rho)[:, 2]
-    bump = 0.5 * (profile[1:] + profile[:-1])
-    n = np.arange(max(map(len, problem.patterns)) + 1)
-    raised = np.outer(n, bump) / L
-    levers = 4 * w.bounds * L
-    # The minimum over m of height (m − h₀)² + levers (raised − m)².
-    both = w.height * levers / (w.height + levers)
-    return (both * (raised - robot.height) ** 2).sum(axis=1)
+def _bumps(problem: Problem) -> np.ndarray:
+    """Return the height of a swing at mid-interval, ``(K,)``."""
+    rho = problem.knots_per_slot
+    profile = problem.robot.swing_height * septic_basis(np.arange(rho + 1) / rho)[:, 2]
+    return np.tile(0.5 * (profile[1:] + profile[:-1]), problem.slots)
 
 
-def _levers(contacts: Contacts, x: list[Any], shares: dict) -> tuple[Any, list[Any]]:
+def _levers(
+    contacts: Contacts, x: list[Any], places: list[Any], shares: dict, bounds: MotionBounds
+) -> tuple[Any, list[Any]]:
     """Bound the horizontal cost of levers and centroid; state eqs 19–22 and 30 at slot ends."""
     problem, S, sizes = contacts.problem, contacts.S, contacts.sizes
     J, K, L, rho = problem.slots, problem.knots, problem.legs, problem.knots_per_slot
@@ -229,7 +261,7 @@ def _levers(contacts: Contacts, x: list[Any], shares: dict) -> tuple[Any, list[A
     counts = L - np.arange(sizes.shape[0])
     cost, rows = 0, []
     for i in range(2):
-        place, step = cp.Variable((L, J + 1)), cp.Variable((L, J))
+        place, step = places[i], cp.Variable((L, J))
         rows += [place[:, 0] == problem.start_contacts[:, i], *within(step, limits.step[i] * S)]
         ends = x[i][0 : K + 1 : rho]
         during = cp.Variable(J)
@@ -240,15 +272,12 @@ def _levers(contacts: Contacts, x: list[Any], shares: dict) -> tuple[Any, list[A
             rolled, exact = mccormick(
                 contacts.rolling,
                 legs @ cp.reshape(ends[1:] - ends[:-1], (1, J), order="C"),
-                low * problem.slot_duration,
-                high * problem.slot_duration,
+                *bounds.travel,
             )
-            age = problem.dt * grid.age[:rho].mean()
             rolled_mean, exact_mean = mccormick(
                 contacts.rolling,
                 legs @ cp.reshape(during - ends[:-1], (1, J), order="C"),
-                low * age,
-                high * age,
+                *bounds.drift,
             )
             slack = cp.Variable((L, J))
             reach = problem.slot_duration * np.array([share[1], share[3]])
@@ -296,9 +325,7 @@ def _vertical_levers(problem: Problem, z: Any, sizes: Any) -> Any:
     With ``h`` the swing's height at mid-interval, ``Σ_l (h S_l − z)² = (2 z − h T/2)² + h² (T − T²/4)``
     for four legs, ``T = Σ_l S_l``; and ``T² = Σ_n n² s_n``.
     """
-    J, L, rho = problem.slots, problem.legs, problem.knots_per_slot
-    profile = problem.robot.swing_height * septic_basis(np.arange(rho + 1) / rho)[:, 2]
-    h = np.tile(0.5 * (profile[1:] + profile[:-1]), J)
+    L, h = problem.legs, _bumps(problem)
     n = np.arange(sizes.shape[0])
     spread = Grid.of(problem).spread
     swinging, square = spread @ (sizes.T @ n), spread @ (sizes.T @ n**2)

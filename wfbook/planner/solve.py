@@ -137,6 +137,8 @@ class Search:
             time_limit: of all searches together, in seconds.
             progress: called now and then.
         """
+        if not problem.start_in_reach:
+            raise InfeasibleError(conflicting_groups(problem))
         begin = time.perf_counter()
         self.problem, self.gap, self.progress = problem, gap, progress
         self.kernel = Kernel(problem)
@@ -156,6 +158,7 @@ class Search:
         """Search with the time that is left (see :func:`solve`)."""
         kernel = self.kernel
         kernel.pruned = np.inf
+        kernel.relax()
         kernel.open()
         tree = Tree(kernel, self.gap, self._left, self.progress)
         status, bound, nodes = tree.run()

@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 
-from wfbook.planner.gait import Gait
 from wfbook.planner.problem import Problem
 from wfbook.terrain import Region
 
@@ -21,11 +20,16 @@ def mirror_symmetric(problem: Problem) -> bool:
     mirrored = np.asarray(problem.start_contacts)[list(MIRROR)]
     contacts = np.abs(mirrored[:, 0] - problem.start_contacts[:, 0]).max() < tolerance
     contacts &= np.abs(2 * axis - mirrored[:, 1] - problem.start_contacts[:, 1]).max() < tolerance
+    state = problem.start_state
+    # Velocity along y and angles about x and z change sign in the mirror.
+    sideways = np.array([state.velocity[1], *state.angles[[0, 2]], *state.rates[[0, 2]]])
     kinds = list(problem.start_end_effectors)
     patterns = {frozenset(p) for p in problem.patterns}
     return bool(
         contacts
         and abs(problem.goal[1] - axis) < tolerance
+        and np.abs(sideways).max() < tolerance
+        and (state.swung == state.swung[list(MIRROR)]).all()
         and kinds == [kinds[m] for m in MIRROR]
         and mirrored_regions(problem) is not None
         and patterns == {frozenset(MIRROR[leg] for leg in p) for p in patterns}
@@ -54,12 +58,6 @@ def _numbers(region: Region, vertices: np.ndarray) -> tuple:
     corners = sorted(map(tuple, (np.round(vertices, 9) + 0.0).tolist()))
     surface = (region.mu_foot, region.mu_wheel, region.mu_wheel_lateral, region.rolling_resistance)
     return (*corners, *surface)
-
-
-def mirrored(problem: Problem, gait: Gait) -> Gait:
-    """Return a gait of a symmetric problem with left and right exchanged."""
-    swapped = [part[list(MIRROR)] for part in gait]
-    return Gait(*swapped[:2], mirrored_regions(problem)[swapped[2]])
 
 
 def mirror_row(S: Any) -> Any:

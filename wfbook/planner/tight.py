@@ -16,12 +16,14 @@ What makes it tight, against the paper's big-M of the same feasible set:
   eq. 15 is split by the number of swinging legs.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import cvxpy as cp
 import numpy as np
 
 from wfbook.friction import friction_pyramid, rolling_friction
+from wfbook.planner.bounds import MotionBounds
 from wfbook.planner.contacts import Contacts
 from wfbook.planner.ground import Places
 from wfbook.planner.problem import Problem
@@ -37,13 +39,13 @@ def build(problem: Problem) -> Program:
     Returns:
         The program. It is the mixed-integer one when ``program.discrete`` is required to be integers.
     """
-    contacts, grid = Contacts.of(problem, inner_knots=True), Grid.of(problem)
+    places, grid = Places.of(problem, MotionBounds.of(problem)), Grid.of(problem)
+    contacts = Contacts.of(problem, places, inner_knots=True)
     force, friction, rows = _forces(contacts, grid)
     program = common(problem, contacts.S, contacts.wheel, force, friction, per_leg=False)
     program.add("friction", *rows)
     program.add("modes", *contacts.rows)
     program.discrete = contacts.discrete()
-    places = Places.of(problem, problem.ground)
     _motion(program, contacts, grid)
     _regions(program, contacts, places)
     _heights(program, contacts, grid, places)
@@ -92,9 +94,8 @@ def region_shares(contacts: Contacts, places: Places) -> tuple[dict[int, dict[in
         By region and axis (0 x, 1 y; only those that matter) the shares ``(L, J)``, zero where the region
         is not occupied, and constraints.
     """
-    ground = contacts.problem.ground
     shares, rows = {}, []
-    for r in range(ground.count):
+    for r in places.used:
         occupied, open_ = contacts.occupancy(r), places.reachable[r].astype(float)
         if not open_.all():
             rows.append(occupied <= open_)
@@ -117,7 +118,8 @@ def _forces(contacts: Contacts, grid: Grid) -> tuple[list[Any], list[Any], list[
     shape = (problem.knots, problem.legs)
     constraints, total, rolling = [], [0, 0, 0], [np.zeros(shape) for _ in range(3)]
     for s, surface in enumerate(problem.ground.surfaces):
-        for e in problem.end_effectors:
+        used = [r for r in surface.regions if r in contacts.regions]
+        for e in problem.end_effectors if used else ():
             mu_t, mu_b = surface.friction[e]
             n, b = (cp.Variable(shape, name=f"{axis}{s}_{e}") for axis in "nb")
             t = cp.Variable(shape, name=f"t{s}_{e}") if mu_t > 0 else np.zeros(shape)
@@ -125,7 +127,7 @@ def _forces(contacts: Contacts, grid: Grid) -> tuple[list[Any], list[Any], list[
             constraints += [
                 side <= 0 for side in sides if isinstance(side, cp.Expression) and not side.is_constant()
             ]
-            constraints.append(n <= problem.limits.force * _loaded(contacts, grid, e, surface.regions))
+            constraints.append(n <= problem.limits.force * _loaded(contacts, grid, e, used))
             for part, direction in zip((n, t, b), surface.basis, strict=True):
                 total = [c + d * part if d else c for c, d in zip(total, direction, strict=True)]
             if e == "wheel" and surface.rolling_resistance > 0:
@@ -135,12 +137,12 @@ def _forces(contacts: Contacts, grid: Grid) -> tuple[list[Any], list[Any], list[
     return total, rolling, constraints
 
 
-def _loaded(contacts: Contacts, grid: Grid, end_effector: str, regions: tuple[int, ...]) -> Any:
+def _loaded(contacts: Contacts, grid: Grid, end_effector: str, regions: Sequence[int]) -> Any:
     """Return at which intervals a leg may push with an end effector on some regions, ``(K, L)``."""
     if end_effector == "foot":
         return grid.spread @ sum(contacts.foot_stance[r] for r in regions).T
-    ground, total = contacts.problem.ground, 0
-    for g, members in enumerate(ground.groups):
+    total = 0
+    for g, members in contacts.groups.items():
         if set(members) <= set(regions):
             total = total + grid.spread @ contacts.wheel_stance[g].T
             continue
@@ -192,10 +194,11 @@ def _regions(program: Program, contacts: Contacts, places: Places) -> None:
     program.add("regions", *(sum(s[i] for s in shares.values()) == ends[i] for i in places.axes))
     if ground.level is None:
         heights = 0
-        for r, (*slopes, constant) in enumerate(ground.planes):
+        for r in contacts.regions:
+            *slopes, constant = ground.planes[r]
             heights = heights + constant * contacts.occupancy(r)
             heights = heights + sum(slopes[i] * shares[r][i] for i in places.axes if slopes[i])
-        program.add("regions", p[2][rho::rho].T == heights)
+        program.add("regions", heights - p[2][rho::rho].T == 0)
     for at, here in enumerate(contacts.passing, start=1):
         point = [p[i][at::rho].T for i in range(3)]
         for r, inside in here.items():

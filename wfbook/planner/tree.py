@@ -62,6 +62,8 @@ class Tree:
     best: tuple[float, Gait] | None = None
     root_bound: float = -np.inf
     error: BaseException | None = None
+    model: Model | None = None
+    dual_bound: float = np.inf
     _begin: float = field(default_factory=time.perf_counter)
     _shown: float = -np.inf
 
@@ -86,10 +88,44 @@ class Tree:
         Returns:
             Status ("optimal", "infeasible", "time limit" or "interrupted"), proven bound, node count.
         """
+        with self._interruptible():
+            root = self.kernel.boxes.root()
+            if root is None or self.kernel.bound(*root).status == "infeasible":
+                return "infeasible", np.inf, 0
+            self.root_bound = self.kernel.bound(*root).bound
+            self.guarded(self._prepare)
+            nodes = self._branch() if self.error is None else 0
+        bound = min(max(self.dual_bound, self.root_bound), self.kernel.pruned, self.incumbent)
+        if isinstance(self.error, KeyboardInterrupt):
+            return "interrupted", bound, nodes
+        if self.error is not None:
+            raise self.error
+        exhausted = self.model is None or self.model.getStatus() in ("infeasible", "optimal", "inforunbd")
+        if self.best is None and exhausted:
+            return "infeasible", np.inf, nodes
+        if self.best is not None and self.incumbent - bound <= self.gap * self.incumbent * (1 + 1e-9):
+            return "optimal", bound, nodes
+        return "time limit", bound, nodes
+
+    def _prepare(self) -> dict[str, Any]:
+        """Find a first plan, and narrow the search to what is better."""
+        for value, gait in improve(self.kernel, self.first, self._late):
+            if value < self.incumbent:
+                self._keep(value, gait)
+        if self.best is not None and self.cutoff > self.root_bound:
+            self.kernel.tighten(self.cutoff, self._late)
+        return {}
+
+    def _late(self) -> bool:
+        """Tell whether it is time to stop."""
+        self.report()
+        return self.error is not None or self.elapsed > self.time_limit
+
+    def _branch(self) -> int:
+        """Let SCIP search; return how many nodes it took."""
         root = self.kernel.boxes.root()
-        if root is None or self.kernel.bound(*root).status == "infeasible":
-            return "infeasible", np.inf, 0
-        self.root_bound = self.kernel.bound(*root).bound
+        if root is None:
+            return 0
         self.model = model = Model()
         model.hideOutput()
         model.setPresolve(SCIP_PARAMSETTING.OFF)
@@ -123,19 +159,9 @@ class Tree:
             freq=0,
             timingmask=SCIP_HEURTIMING.BEFORENODE,
         )
-        with self._interruptible():
-            model.optimize()
-        status, nodes = model.getStatus(), int(model.getNTotalNodes())
-        bound = min(model.getDualbound(), self.kernel.pruned, self.incumbent)
-        if isinstance(self.error, KeyboardInterrupt):
-            return "interrupted", bound, nodes
-        if self.error is not None:
-            raise self.error
-        if self.best is None and status in ("infeasible", "optimal", "inforunbd"):
-            return "infeasible", np.inf, nodes
-        if self.best is not None and self.incumbent - bound <= self.gap * self.incumbent * (1 + 1e-9):
-            return "optimal", bound, nodes
-        return "time limit", bound, nodes
+        model.optimize()
+        self.dual_bound = model.getDualbound()
+        return int(model.getNTotalNodes())
 
     @contextlib.contextmanager
     def _interruptible(self) -> Iterator[None]:
@@ -188,9 +214,12 @@ class Tree:
         if self.progress is None or (not force and self.elapsed - self._shown < 0.1):
             return
         self._shown = self.elapsed
-        bound = min(max(self.model.getDualbound(), self.root_bound), self.kernel.pruned, self.incumbent)
+        begun = self.model is not None
+        bound = max(self.model.getDualbound() if begun else -np.inf, self.root_bound)
+        bound = min(bound, self.kernel.pruned, self.incumbent)
         gap = (self.incumbent - bound) / self.incumbent if self.best else np.inf
-        self.progress(Progress(int(self.model.getNTotalNodes()), self.incumbent, bound, gap, self.elapsed))
+        nodes = int(self.model.getNTotalNodes()) if begun else 0
+        self.progress(Progress(nodes, self.incumbent, bound, gap, self.elapsed))
 
     def guarded(
         self, action: Callable[[], dict[str, Any]], otherwise: Any = SCIP_RESULT.DIDNOTRUN
@@ -206,7 +235,8 @@ class Tree:
                 return action()
             except BaseException as error:
                 self.error = error
-        self.model.interruptSolve()
+        if self.model is not None:
+            self.model.interruptSolve()
         return {"result": otherwise}
 
 
@@ -280,7 +310,6 @@ class _Split(Branchrule):
                     tree.model.chgVarUbNode(node, variable, float(up))
         return {"result": SCIP_RESULT.BRANCHED}
 
-
     def _placed(self, box: tuple[np.ndarray, np.ndarray]) -> bool:
         """Tell whether a box is of no interest in which only regions are open; price what it rounds to."""
         tree, kernel, layout = self.tree, self.tree.kernel, self.tree.kernel.boxes.layout
@@ -331,7 +360,9 @@ class _Price(Conshdlr):
         tree = self.tree
         z = np.array([tree.model.getSolVal(solution, v) for v in tree.variables])
         gait = tree.kernel.boxes.gait(z)
-        if np.abs(z - np.rint(z)).max() > INTEGRAL or not tree.kernel.boxes.admissible(gait):
+        # The incumbent may lie outside of the boxes, which were narrowed to what is better than it.
+        known = tree.best is not None and gait.key == tree.best[1].key
+        if np.abs(z - np.rint(z)).max() > INTEGRAL or not (known or tree.kernel.boxes.admissible(gait)):
             return {"result": SCIP_RESULT.INFEASIBLE}
         cost = tree.model.getSolVal(solution, tree.cost)
         right = cost >= tree.kernel.leaf(gait).value - 1e-9
@@ -365,7 +396,7 @@ class _Price(Conshdlr):
 
 
 class _Gaits(Heur):
-    """Tries the gaits a roboticist would, and improves the best."""
+    """Hands SCIP the plan that was found before its tree began."""
 
     def __init__(self, tree: Tree):
         self.tree = tree
@@ -375,16 +406,5 @@ class _Gaits(Heur):
         return self.tree.guarded(self._run)
 
     def _run(self) -> dict[str, Any]:
-        tree, found = self.tree, False
-        if tree.best is not None and np.isfinite(tree.kernel.leaf(tree.best[1]).value):
-            found = tree.submit(self)
-
-        def late() -> bool:
-            tree.report()
-            return tree.error is not None or tree.elapsed > tree.time_limit
-
-        for value, gait in improve(tree.kernel, tree.first, late):
-            if value < tree.incumbent:
-                tree._keep(value, gait)
-                found |= tree.submit(self)
+        found = self.tree.best is not None and self.tree.submit(self)
         return {"result": SCIP_RESULT.FOUNDSOL if found else SCIP_RESULT.DIDNOTFIND}

@@ -1,0 +1,100 @@
+"""Where the centre of mass can be in any plan worth finding: bounds tightened by an incumbent.
+
+Once a plan of some cost is known, only cheaper ones matter, and those keep near their way: the goal's
+term alone says where they end. The node QP is asked how far each quantity may go before its bound
+exceeds the incumbent. Narrower boxes make McCormick's inequalities and the hulls of regions tighter, and
+put regions out of reach.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+_MARGIN = 1e-4
+"""Of a metre: what a solver's tolerance may take from a bound."""
+
+_PROBES = 2
+
+
+@dataclass(frozen=True)
+class MotionBounds:
+    """Ranges of the centre of mass; first index 0 for the lower end, 1 for the upper.
+
+    Attributes:
+        place: ``(2, 2, J)`` of x and y (second index) when each slot ends.
+        travel: ``(2, J)`` of the way along x within each slot.
+        drift: ``(2, J)`` of the mean over a slot's knots of x, from where the slot begins.
+    """
+
+    place: np.ndarray
+    travel: np.ndarray
+    drift: np.ndarray
+
+    @classmethod
+    def of(cls, problem: Any) -> "MotionBounds":
+        """Return what the speed limits allow."""
+        limits, rho, J = problem.limits, problem.knots_per_slot, problem.slots
+        forward, backward = limits.speed
+        speeds = np.array([[-backward, -limits.lateral_speed], [forward, limits.lateral_speed]])
+        t = problem.slot_duration * np.arange(1, J + 1)
+        place = np.asarray(problem.start, float)[None, :, None] + speeds[:, :, None] * t
+        age = problem.dt * np.arange(1, rho + 1).mean()
+        travel = np.repeat(speeds[:, :1] * problem.slot_duration, J, axis=1)
+        return cls(place, travel, np.repeat(speeds[:, :1] * age, J, axis=1))
+
+
+def tightened(
+    bounds: MotionBounds,
+    quantities: dict[str, np.ndarray],
+    minimise: Callable[[np.ndarray], tuple[float, float]],
+    base: float,
+    cutoff: float,
+    stop: Callable[[], bool],
+) -> MotionBounds:
+    """Narrow ranges to what plans cheaper than a cutoff can have.
+
+    For any multiplier μ > 0 and a linear quantity ℓ, ``min (cost + μ ℓ) = q`` implies ``ℓ ≥ (q − U)/μ`` on
+    every plan that costs at most U. The best μ is where the minimiser costs just U.
+
+    Args:
+        bounds: to begin with.
+        quantities: by name of a field, rows ``(J, n)`` of linear functions of the QP's variables (for
+            ``place`` those of x).
+        minimise: adds a linear cost to the QP; returns a lower bound of its optimum and the minimiser's
+            value of that linear cost.
+        base: lower bound of the QP's optimum.
+        cutoff: U.
+        stop: asked now and then; once true, the rest stays as it is.
+    """
+    changed = {}
+    for name, rows in quantities.items():
+        ranges = getattr(bounds, name).copy()
+        view = ranges[:, 0] if name == "place" else ranges
+        for j, row in enumerate(rows):
+            if stop():
+                break
+            for side, sign in ((0, 1.0), (1, -1.0)):
+                limit = sign * _least(sign * row, minimise, base, cutoff)
+                view[side, j] = max(view[side, j], limit) if side == 0 else min(view[side, j], limit)
+        changed[name] = ranges
+    return replace(bounds, **changed)
+
+
+def _least(
+    row: np.ndarray, minimise: Callable[[np.ndarray], tuple[float, float]], base: float, cutoff: float
+) -> float:
+    """Return a lower bound of a linear function over all points of cost below the cutoff."""
+    best, multiplier = -np.inf, max(cutoff - base, 1e-6) / 0.1
+    for _ in range(_PROBES):
+        value, part = minimise(multiplier * row)
+        if not np.isfinite(value):
+            break
+        best = max(best, (value - cutoff) / multiplier)
+        spent = value - part - base  # what the minimiser pays for going there
+        if spent <= 1e-9:
+            multiplier *= 4.0
+        else:
+            multiplier *= float(np.clip(np.sqrt((cutoff - base) / spent), 0.1, 10.0))
+    return best - _MARGIN
