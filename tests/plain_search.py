@@ -28,6 +28,7 @@ EXACT = 1e-6
 """Relative difference that the solver of convex programs leaves."""
 
 _INTEGRAL = 1e-5
+_PATIENCE = 300.0  # seconds for the planner; it must not be what ends first
 
 
 @dataclass
@@ -152,7 +153,7 @@ def draw(rng: np.random.Generator, both: bool) -> Problem:
             beyond_reach=True,
             weights=Weights(goal=rng.choice([10.0, 40.0]), swing=rng.choice([0.02, 0.004])),
         )
-        if (problem.start_regions >= 0).all():
+        if problem.start_in_reach:
             return problem
 
 
@@ -220,12 +221,17 @@ class Verdict:
 
 
 def judge(problem: Problem, time_limit: float) -> Verdict:
-    """Search a problem twice."""
+    """Search a problem twice.
+
+    Args:
+        problem: a small one.
+        time_limit: of the plain search, in seconds of the processor.
+    """
     begin = time.perf_counter()
     objective = bound = np.inf
     finished, swings, crossings = True, 0, 0
     try:
-        plan = solve(problem, gap=GAP, time_limit=time_limit)
+        plan = solve(problem, gap=GAP, time_limit=_PATIENCE)
         objective, bound = plan.meta["objective"], plan.meta["bound"]
         finished, swings = plan.meta["gap"] <= GAP * (1 + 1e-6), int(plan.S.sum())
         places = np.column_stack([problem.start_regions, plan.meta["regions"]])
