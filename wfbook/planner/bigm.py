@@ -349,7 +349,8 @@ def solve(problem: Problem, gap: float, time_limit: float) -> Plan:
         "gap_target": gap,
         "status": statuses.get(model.getStatus(), "optimal"),
         "nodes": int(model.getNTotalNodes()),
-        "root_bound": model.getDualboundRoot() + _offset(inverse),
+        # SCIP calls the root's bound infinite when it closes the root by cutting it off.
+        "root_bound": min(model.getDualboundRoot() + _offset(inverse), bound),
         "rejected_gaits": 0,
         "solve_time": spent,
         "build_time": built,
