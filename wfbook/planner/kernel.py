@@ -37,6 +37,7 @@ class Kernel:
         problem: what is asked.
         program: the tight formulation, whose value at fixed binaries is the truth.
         boxes: of gaits.
+        motion: bounds within which the relaxation holds.
         excluded: gaits that are not to be found (they could not be polished).
         qps: relaxations solved so far.
         leaves: exact programs solved so far.
@@ -47,6 +48,7 @@ class Kernel:
     problem: Problem
     program: Program = field(init=False)
     boxes: Boxes = field(init=False)
+    motion: MotionBounds = field(init=False)
     excluded: set[bytes] = field(default_factory=set)
     qps: int = 0
     leaves: int = 0
@@ -72,7 +74,7 @@ class Kernel:
     def _bound_within(self, bounds: MotionBounds) -> None:
         """Compile the relaxation for a motion within bounds, and forget what others said."""
         problem, order = self.problem, self.problem.ground.order
-        self._motion = bounds
+        self.motion = bounds
         if self._worker is not None:
             self.close()  # it knows the old programs
         relaxed = relaxation.build(problem, bounds)
@@ -132,12 +134,12 @@ class Kernel:
             return self._qp.minimise(*(side.astype(float) for side in root), linear)
 
         self._bound_within(tightened(self._anywhere, quantities, minimise, base, cutoff, stop))
-        self.boxes = Boxes(self.problem, Places.of(self.problem, self._motion).reachable)
+        self.boxes = Boxes(self.problem, Places.of(self.problem, self.motion).reachable)
         self.pruned = min(self.pruned, cutoff)
 
     def relax(self) -> None:
         """Take back what :meth:`tighten` did."""
-        if self._motion is not self._anywhere:
+        if self.motion is not self._anywhere:
             self._bound_within(self._anywhere)
             self.boxes = Boxes(self.problem, Places.of(self.problem, self._anywhere).reachable)
 

@@ -1,0 +1,105 @@
+"""Bounds on several regions: what they cut off must not be missed, what they keep must be there."""
+
+import numpy as np
+import pytest
+
+from wfbook import terrain
+from wfbook.planner import Problem, solve
+from wfbook.planner.bounds import MotionBounds
+from wfbook.planner.gait import Gait
+from wfbook.planner.gaits import dive, templates
+from wfbook.planner.ground import GroundMap, Places
+from wfbook.planner.kernel import Kernel
+
+RAMP = terrain.ramp(start=0.24, length=0.5, rolling_resistance=0.005)
+STONES = terrain.stepping_stones(gap=0.1, stone=0.2, start=0.25)
+
+
+def problem(ground, slots=4, **changes) -> Problem:
+    """Return a problem on some ground with a goal that takes every slot."""
+    return Problem(ground, **{"goal": (0.1 * slots, 0.0), "slots": slots} | changes)
+
+
+@pytest.mark.parametrize("ground", [RAMP, terrain.ramp(direction="up", start=0.24), STONES])
+def test_the_relaxation_is_below_every_leaf_and_below_no_box_of_it(ground):
+    p = problem(ground)
+    kernel, checked = Kernel(p), 0
+    root = kernel.bound(*kernel.boxes.root()).bound
+    gaits = kernel.complete([g for g in templates(p) if kernel.boxes.of_modes(g) is not None][5::6])
+    for gait in filter(None, gaits):
+        leaf = kernel.leaf(gait)
+        if leaf.status != "solved":
+            continue
+        here = kernel.bound(*(2 * [kernel.boxes.vector(gait)]))
+        modes = kernel.gait_bounds([gait.open()])[0]
+        assert root <= modes + 1e-4
+        assert here.status == "infeasible" or modes <= here.bound + 1e-4  # a mirror image is cut off
+        assert min(here.bound, modes) <= leaf.value + 1e-6
+        assert leaf.bound <= leaf.value <= leaf.bound * (1 + 1e-3)
+        checked += 1
+    assert checked >= 3
+
+
+def test_narrowed_motion_holds_the_optimum_and_its_bound():
+    p = problem(RAMP, slots=3)
+    plan = solve(p, gap=1e-2)
+    kernel = Kernel(p)
+    kernel.tighten(plan.meta["objective"] * 1.02)
+    narrow, wide, rho = kernel.motion, MotionBounds.of(p), p.knots_per_slot
+    x = plan.x[:, 0]
+    ends = x[rho::rho]
+    assert (narrow.place[0, 0] <= ends).all()
+    assert (ends <= narrow.place[1, 0]).all()
+    travel = np.diff(x[::rho])
+    assert (narrow.travel[0] <= travel).all()
+    assert (travel <= narrow.travel[1]).all()
+    assert np.ptp(narrow.place[:, 0], axis=0).sum() < 0.9 * np.ptp(wide.place[:, 0], axis=0).sum()
+    gait = Gait(plan.S.astype(int), plan.end_effector.astype(int), np.array(plan.meta["regions"]))
+    z = kernel.boxes.vector(gait)
+    box = kernel.boxes.root()
+    assert (box[0] <= z).all()
+    assert (z <= box[1]).all()
+
+
+def test_a_ladder_says_which_region():
+    p = problem(STONES)
+    boxes = Kernel(p).boxes
+    rng = np.random.default_rng(0)
+    regions = rng.integers(p.ground.count, size=(4, p.slots))
+    gait = Gait(np.zeros_like(regions), np.zeros_like(regions), regions)
+    assert (boxes.gait(boxes.vector(gait)).region == regions).all()
+    assert not boxes.admissible(gait), "a foot that does not swing stays"
+
+
+def test_a_dive_finds_a_plan_across_gaps():
+    p = problem(STONES, slots=5, end_effectors=("foot",))
+    (gait,) = dive(Kernel(p))
+    assert Kernel(p).leaf(gait).status == "solved"
+
+
+def test_a_terrain_in_one_plane_is_level_and_its_surfaces_are_one():
+    ground = GroundMap.of(STONES)
+    assert ground.level == 0.0
+    assert len(ground.surfaces) == 1
+    assert not ground.rolls_over_edges
+    slope = GroundMap.of(RAMP)
+    assert slope.level is None
+    assert [surface.regions for surface in slope.surfaces] == [(0, 2), (1,)]
+    assert slope.rolls_over_edges
+    flat = problem(terrain.flat())
+    assert Places.of(flat, MotionBounds.of(flat)).axes == (), "wide ground is no constraint"
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_boxes_of_places_hold_what_a_plan_does(seed):
+    rng = np.random.default_rng(seed)
+    p = problem(STONES, slots=3, goal=(rng.uniform(0.1, 0.3), 0.0))
+    plan = solve(p, gap=0.05)
+    places = Places.of(p, MotionBounds.of(p))
+    rho = p.knots_per_slot
+    for leg in range(4):
+        for j in range(p.slots):
+            point, r = plan.p[(j + 1) * rho, leg, :2], plan.meta["regions"][leg][j]
+            assert places.reachable[r, leg, j]
+            assert (places.within[r, :, leg, j] - 1e-6 <= point).all()
+            assert (point <= places.upto[r, :, leg, j] + 1e-6).all()
