@@ -1,11 +1,13 @@
 """Chapter 5: the mixed-integer program (Paper A, sections II-E and II-F).
 
-In reading order: :mod:`.problem` says what is asked, :mod:`.program` states what every formulation
-shares, :mod:`.bigm` is the paper's own, :mod:`.tight` the fast one. :mod:`.conic` compiles them for
-Clarabel, :mod:`.presolve` removes what fixed binaries decide, :mod:`.relaxation` bounds cheaply.
-:mod:`.boxes` and :mod:`.symmetry` are the logic of gaits, :mod:`.kernel` bounds and splits, on two cores
-with :mod:`.worker`, :mod:`.gaits` guesses, :mod:`.tree` lets SCIP search, :mod:`.explain` says why there is
-nothing to find. :mod:`.polish` makes the result true, :mod:`.plan` keeps it.
+In reading order: :mod:`.ground` reads the terrain and :mod:`.problem` says what is asked. :mod:`.program`
+states what every formulation shares, :mod:`.bigm` is the paper's own; :mod:`.contacts` and :mod:`.tight` are
+the fast one. :mod:`.conic` compiles them for Clarabel, :mod:`.presolve` removes what fixed binaries decide,
+:mod:`.crossings` finds where wheels cross edges; :mod:`.relaxation` bounds cheaply, :mod:`.bounds` narrows.
+:mod:`.gait`, :mod:`.boxes` and :mod:`.symmetry` are the logic of gaits. :mod:`.kernel` bounds and prices, on
+two cores with :mod:`.worker`; :mod:`.gaits` guesses, :mod:`.branching` splits, :mod:`.tree` lets SCIP search
+by its :mod:`.plugins`, :mod:`.explain` says why there is nothing to find. :mod:`.extract` reads the solution,
+:mod:`.polish` makes it true, :mod:`.plan` keeps it, :mod:`.windows` plans far.
 """
 
 from wfbook.planner.explain import InfeasibleError, NoPlanError
@@ -14,6 +16,7 @@ from wfbook.planner.polish import polish, repaired, torque_mismatch
 from wfbook.planner.problem import InitialState, Limits, Problem, Weights
 from wfbook.planner.solve import solve, solve_executable
 from wfbook.planner.tree import Progress
+from wfbook.planner.windows import solve_windows
 
 __all__ = [
     "InfeasibleError",
@@ -28,5 +31,6 @@ __all__ = [
     "repaired",
     "solve",
     "solve_executable",
+    "solve_windows",
     "torque_mismatch",
 ]

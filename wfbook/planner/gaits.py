@@ -13,7 +13,7 @@ TROT = ((0, 3), (1, 2))
 CRAWL = ((2,), (0,), (3,), (1,))
 
 _EXACT = 2  # gaits solved exactly in each round of the local search
-_ROUNDS = 6
+_ROUNDS = 10
 _DIVES = 400  # relaxations that a dive may take
 _BATCH = 8  # gaits bounded between two looks at the clock
 
@@ -71,6 +71,10 @@ def neighbours(problem: Problem, gait: Gait) -> Iterator[Gait]:
                     yield _with(problem, gait, leg, sorted([*rest, (other, kind)]))
             if problem.wheels:
                 yield _with(problem, gait, leg, sorted([*rest, (j, 1 - kind)]))
+    for leg, j in np.argwhere((S == 0) & (wheel == 1)) if _rolling_slows(problem) else ():
+        # A push: down on the foot, and two slots later on the wheel again.
+        if j + 2 < J and not S[leg, j : j + 3].any():
+            yield _with(problem, gait, leg, sorted([*landed[leg], (j, 0), (j + 2, 1)]))
     for pair in ((0, 3), (1, 2)):
         for j in range(J):
             if S[pair[0], j] and S[pair[1], j]:
@@ -79,6 +83,12 @@ def neighbours(problem: Problem, gait: Gait) -> Iterator[Gait]:
                     rest = [s for s in landed[leg] if s[0] != j]
                     changed = _with(problem, changed, leg, rest)
                 yield changed
+
+
+def _rolling_slows(problem: Problem) -> bool:
+    """Tell whether wheels lose speed, so that it is worth a swing to push."""
+    ground = problem.ground
+    return ground.level is None or any(s.rolling_resistance > 0 for s in ground.surfaces)
 
 
 def _with(problem: Problem, gait: Gait, leg: int, landings: list) -> Gait:
@@ -97,14 +107,15 @@ def _open(S: np.ndarray, wheel: np.ndarray) -> Gait:
 
 
 def improve(
-    kernel: Kernel, first: Sequence[Gait] = (), stop: Callable[[], bool] = lambda: False
+    kernel: Kernel, stop: Callable[[], bool] = lambda: False, known: Sequence[Gait] = ()
 ) -> Iterator[tuple[float, Gait]]:
-    """Yield ever better gaits: templates ranked by the QP, the best solved exactly, then changed bit by bit.
+    """Yield ever better gaits: the best templates by the QP, solved exactly, then changed bit by bit.
 
     Args:
         kernel: bounds and leaves of the problem.
         first: gaits to try besides the templates.
         stop: asked now and then; once true, nothing more is tried.
+        known: gaits to try before all others, such as the rest of an earlier plan.
 
     Yields:
         Cost and gait, each better than the one before.
@@ -132,17 +143,23 @@ def improve(
         return [fresh[i] for i in order if bounds[i] < below]
 
     best, current = np.inf, None
-    for _ in range(_ROUNDS):
-        candidates = [*first, *templates(problem)] if current is None else neighbours(problem, current)
-        tried = [g for g in kernel.complete(ranked(candidates, best)[:_EXACT]) if g is not None]
+    for turn in range(_ROUNDS + 1):
+        if turn == 0:
+            tried = [gait for gait in known if kernel.boxes.admissible(gait)]
+        else:
+            candidates = templates(problem) if turn == 1 else neighbours(problem, current)
+            tried = [g for g in kernel.complete(ranked(candidates, best)[:_EXACT]) if g is not None]
         costs = kernel.price(tried, best)
-        if current is None and not np.isfinite(min(costs, default=np.inf)):
+        if turn == 1 and current is None and not np.isfinite(min(costs, default=np.inf)):
             tried = list(dive(kernel, stop))
             costs = kernel.price(tried)
-        if not costs or min(costs) >= best or stop():
+        if costs and min(costs) < best:
+            best, current = min(costs), tried[int(np.argmin(costs))]
+            yield best, current
+        elif turn > 1 or (turn == 1 and current is None):
             return
-        best, current = min(costs), tried[int(np.argmin(costs))]
-        yield best, current
+        if stop():
+            return
 
 
 def dive(kernel: Kernel, stop: Callable[[], bool] = lambda: False) -> Iterator[Gait]:

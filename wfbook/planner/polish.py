@@ -27,8 +27,11 @@ from wfbook.planner.program import motion_cost
 ANGLE_WEIGHTS = {"goal_angle": 100.0, "angle": 20.0, "angular_rate": 1.0}
 """Weights of rotation while polishing: the true torque is to be spent on staying level."""
 
-PRICE = 20.0
-"""Of a body weight times a metre of torque that no contact makes, for each interval and axis."""
+PRICE = 1000.0
+"""Of a body weight times a metre of torque that no contact makes, for each interval and axis.
+
+It must exceed what such torque earns anywhere, or a goal farther than the gait can go buys it.
+"""
 
 TOLERANCE_NM = 1e-3
 """The largest true torque mismatch at which the iteration ends."""

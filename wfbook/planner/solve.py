@@ -2,7 +2,7 @@
 
 import contextlib
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -49,7 +49,7 @@ def solve(
     """
     if formulation not in FORMULATIONS:
         raise ValueError(f"formulation: {formulation!r}, expected one of {FORMULATIONS}")
-    _check_limits(gap, time_limit)
+    check_limits(gap, time_limit)
     if formulation == "paper":
         return bigm.solve(problem, gap, time_limit)
     with contextlib.closing(Search(problem, gap, time_limit, progress)) as search:
@@ -80,7 +80,7 @@ def solve_executable(
         NoPlanError: the time limit came before a plan that can be polished.
         Others as for :func:`solve`.
     """
-    _check_limits(gap, time_limit)
+    check_limits(gap, time_limit)
     polisher = Polisher(problem)
     if formulation == "paper":
         relaxed = solve(problem, formulation, gap, time_limit)
@@ -91,10 +91,10 @@ def solve_executable(
             )
         return relaxed, polished
     with contextlib.closing(Search(problem, gap, time_limit, progress)) as search:
-        return _first_executable(search, polisher)
+        return first_executable(search, polisher)
 
 
-def _first_executable(search: "Search", polisher: Polisher) -> tuple[Plan, Plan]:
+def first_executable(search: "Search", polisher: Polisher) -> tuple[Plan, Plan]:
     """Return the best gait that can be polished, as a relaxed and a polished plan."""
     while True:
         relaxed = search.run()
@@ -112,7 +112,8 @@ def _first_executable(search: "Search", polisher: Polisher) -> tuple[Plan, Plan]
             raise NoPlanError(f"{relaxed.meta['status']} before a gait was found that can be polished")
 
 
-def _check_limits(gap: float, time_limit: float) -> None:
+def check_limits(gap: float, time_limit: float) -> None:
+    """Refuse a gap or a time limit that is not a positive number."""
     if not (np.isfinite(gap) and gap > 0):
         raise ValueError(f"gap: {gap!r} is not a positive number")
     if not (np.isfinite(time_limit) and time_limit > 0):
@@ -128,6 +129,8 @@ class Search:
         gap: float,
         time_limit: float,
         progress: Callable[[Progress], None] | None = None,
+        gaits: Sequence[Gait] = (),
+        explain: bool = True,
     ):
         """Build and compile both programs.
 
@@ -136,11 +139,14 @@ class Search:
             gap: relative gap at which a search ends.
             time_limit: of all searches together, in seconds.
             progress: called now and then.
+            gaits: to be priced first, whatever the time limit.
+            explain: say why, should there be no plan; that can take longer than to find it out.
         """
         if not problem.start_in_reach:
             raise InfeasibleError(conflicting_groups(problem))
         begin = time.perf_counter()
-        self.problem, self.gap, self.progress = problem, gap, progress
+        self.problem, self.gap, self.progress, self.gaits = problem, gap, progress, gaits
+        self.explain = explain
         self.kernel = Kernel(problem)
         self.build_time = time.perf_counter() - begin
         self._left = time_limit
@@ -160,12 +166,13 @@ class Search:
         kernel.pruned = np.inf
         kernel.relax()
         kernel.open()
-        tree = Tree(kernel, self.gap, self._left, self.progress)
+        tree = Tree(kernel, self.gap, self._left, self.progress, self.gaits)
         status, bound, nodes = tree.run()
         self._left = max(self._left - tree.elapsed, 1e-3)
         self._spent, self._nodes = self._spent + tree.elapsed, self._nodes + nodes
         if status == "infeasible":
-            raise InfeasibleError(conflicting_groups(self.problem), len(kernel.excluded))
+            groups = conflicting_groups(self.problem) if self.explain else ()
+            raise InfeasibleError(groups, len(kernel.excluded))
         if tree.best is None:
             if status == "interrupted":
                 raise KeyboardInterrupt
