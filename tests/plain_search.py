@@ -12,7 +12,6 @@ import time
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy import optimize
 
 from wfbook.centroidal import Robot
 from wfbook.planner import InfeasibleError, NoPlanError, Problem, solve, tight
@@ -108,23 +107,7 @@ class PlainSearch:
     def _solve(self, fixed: np.ndarray) -> Solution:
         known = ~np.isnan(fixed)
         self.nodes += 1
-        found = solve_fixed(self._conic, self._columns[known], fixed[known])
-        if found.status == "failed" and not self._has_point(fixed):
-            return Solution("infeasible", np.inf, np.inf, found.y)
-        return found
-
-    def _has_point(self, fixed: np.ndarray) -> bool:
-        """Tell by another solver whether the linear rows have a point; the cones exclude none."""
-        conic, rows = self._conic, self._conic.equalities + self._conic.inequalities
-        low, up = np.full(conic.A.shape[1], -np.inf), np.full(conic.A.shape[1], np.inf)
-        low[self._columns], up[self._columns] = np.nan_to_num(fixed, nan=0.0), np.nan_to_num(fixed, nan=1.0)
-        least = np.where(np.arange(rows) < conic.equalities, conic.b[:rows], -np.inf)
-        answer = optimize.milp(
-            np.zeros(len(low)),
-            constraints=optimize.LinearConstraint(conic.linear, least, conic.b[:rows]),
-            bounds=optimize.Bounds(low, up),
-        )
-        return answer.status != 2
+        return solve_fixed(self._conic, self._columns[known], fixed[known])
 
 
 def draw(rng: np.random.Generator, both: bool) -> Problem:

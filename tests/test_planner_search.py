@@ -154,6 +154,14 @@ def test_a_presolved_leaf_has_the_value_of_the_program_itself():
     assert slack[conic.equalities : conic.equalities + conic.inequalities].min() > -1e-6
 
 
+def test_a_coefficient_of_rounding_size_decides_nothing():
+    known, y = cp.Variable(1), cp.Variable(1)
+    conic = Conic.compile(cp.sum_squares(y - 1), [known + 1e-15 * y == 0.5])
+    found = solve_fixed(conic, conic.columns(known), np.array([0.5 + 2e-15]))
+    assert found.status == "solved"
+    assert conic.value(y, found.y) == pytest.approx(1.0)
+
+
 def test_translated_and_mirrored_problems_have_translated_and_mirrored_optima():
     # The other diagonal's start is a little off, so that the problem is not its own mirror image.
     offsets = np.array([[0.02, 0.0], [0.0, 0.01], [0.0, 0.0], [-0.01, 0.0]])

@@ -5,13 +5,20 @@ inequalities: an interior-point method finds no interior there, runs longer, and
 Removing what is decided leaves a third of the program.
 """
 
+from dataclasses import replace
+
 import clarabel
 import numpy as np
-from scipy import sparse
+from scipy import optimize, sparse
 
 from wfbook.planner.conic import Conic, Solution, solve
 
 _TOLERANCE = 1e-9
+
+_PATIENCE = 5.0  # seconds
+
+_INFEASIBLE = 2
+"""The status with which SciPy's ``linprog`` says so."""
 
 _NOTHING = 1e-11
 """A coefficient that is rounding error: dividing by it would decide a variable by noise."""
@@ -55,9 +62,29 @@ def solve_fixed(conic: Conic, columns: np.ndarray, values: np.ndarray) -> Soluti
     sizes = int((keep & equal).sum()), int((keep & ~equal).sum())
     cones = [clarabel.ZeroConeT(sizes[0]), clarabel.NonnegativeConeT(sizes[1]), *conic.cones]
     result = solve(P, (conic.q + gradient)[free], A, b, cones, offset)
+    if result.status == "failed" and _contradictory(A, b, *sizes):
+        result = replace(result, status="infeasible", value=np.inf, bound=np.inf)
     if result.status != "infeasible":
         y[free] = result.y
     return Solution(result.status, result.value, result.bound, y)
+
+
+def _contradictory(A: sparse.csc_matrix, b: np.ndarray, equalities: int, inequalities: int) -> bool:
+    """Tell whether linear rows have no point, by the simplex method.
+
+    An interior-point method often ends "almost infeasible", which is no proof: here it is settled.
+    """
+    linear, below = A[:equalities], A[equalities : equalities + inequalities]
+    answer = optimize.linprog(
+        np.zeros(A.shape[1]),
+        A_ub=below,
+        b_ub=b[equalities : equalities + inequalities],
+        A_eq=linear,
+        b_eq=b[:equalities],
+        bounds=(None, None),
+        options={"time_limit": _PATIENCE},
+    )
+    return answer.status == _INFEASIBLE
 
 
 def _decide(
