@@ -138,7 +138,8 @@ def metrics_of(
     (``cot_abs``) and once with only the work the motors put in (``cot_positive``). ``base_rms_m`` and
     ``base_rms_rad`` are root mean squares of the error's length from the plan's start on. ``slip_max_m`` is
     how far a standing foot, or a wheel sideways, slid; ``region_violation_max_m`` how far a standing foot was
-    beside its region, or a wheel beside all of its group. ``lift_off_m`` is the largest clearance of each swing.
+    beside its region, or a wheel beside all of its group. ``lift_off_m`` is the largest clearance of each
+    swing.
 
     Args:
         log: arrays of :class:`Run`.

@@ -231,7 +231,7 @@ class Tracker:
     def _standing(self, leg: int, t: float, com: np.ndarray) -> np.ndarray:
         """Return where a standing leg's contact point is to be, ``(3,)``; a rolling one goes with the CoM.
 
-        A leg that landed early stands as the plan lets it stand later, one that lifts late as it stood before.
+        A leg that landed early stands as it will by plan, one that lifts late as it stood before.
         """
         flights, count = self.flights[leg], self.lifted[leg]
         t = max(t, flights[count - 1].end) if count else t

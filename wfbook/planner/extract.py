@@ -31,7 +31,9 @@ def read(program: Program, bounds: bool = True) -> dict[str, list[np.ndarray]]:
     }
 
 
-def plan_of(problem: Problem, values: dict[str, Any], gait: Gait, meta: dict[str, Any]) -> Plan:
+def plan_of(
+    problem: Problem, values: dict[str, Any], gait: Gait, meta: dict[str, Any]
+) -> Plan:
     """Assemble a plan from the program's values.
 
     Args:

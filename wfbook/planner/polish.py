@@ -36,7 +36,7 @@ It must exceed what such torque earns anywhere, or a goal farther than the gait 
 """
 
 EDGE_PRICE = 20.0
-"""Of a metre that a contact is nearer to an edge than it should be, besides what it could earn at the goal."""
+"""Of a metre that a contact is too near to an edge, besides what it could earn at the goal."""
 
 TOLERANCE_NM = 1e-3
 """The largest true torque mismatch at which the iteration ends."""
@@ -80,7 +80,7 @@ class Polisher:
             The polished plan. ``meta["torque_mismatch_nm"]`` holds the rms per axis of what is left,
             ``meta["relaxed_torque_mismatch_nm"]`` that of the relaxed plan; :func:`repaired` judges.
         """
-        problem, weight, conic = self.problem, self.problem.robot.weight, self._conic
+        weight, conic = self.problem.robot.weight, self._conic
         gait = gait_of(plan)
         columns, fixed = self._binaries(gait, plan.p)
         off_edges = self._off_edges(gait)

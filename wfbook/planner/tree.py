@@ -280,6 +280,7 @@ class _Split(Branchrule):
                     tree.model.chgVarUbNode(node, variable, float(up))
         return {"result": SCIP_RESULT.BRANCHED}
 
+
     def _placed(self, box: tuple[np.ndarray, np.ndarray]) -> bool:
         """Tell whether a box is of no interest in which only regions are open; price what it rounds to."""
         tree, kernel, layout = self.tree, self.tree.kernel, self.tree.kernel.boxes.layout
