@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wfbook.footing import Footing
-from wfbook.go1 import RADII
+from wfbook.go1 import FOOT_RADIUS, RADII, calf_pitch, nominal
 from wfbook.go1_dynamics import GRAVITY, Go1Dynamics, rotation
 from wfbook.lean import Lean
 from wfbook.modes import END_EFFECTORS, LEGS
@@ -45,6 +45,7 @@ _PATIENCE = 0.05
 _COMMITTED = 0.9
 _FARTHEST_ASIDE = 0.06
 _SWITCH_ROOM = 0.004
+_OFF_EDGES = 0.005
 
 
 @dataclass(frozen=True)
@@ -130,9 +131,11 @@ class Tracker:
         self._searching_since = np.full(4, np.nan)
         self._last_touch = np.zeros(4)
         self._shift = np.zeros((4, 3))
+        self._extremes = np.zeros((4, 2, 3))
         self._start = np.zeros(4)
         kinds = [END_EFFECTORS.index(name) for name in plan.meta["start_end_effectors"]]
         self._kinds = np.array(kinds)
+        self._hips = nominal()["hips"]
         self.footing = Footing(plan.terrain, plan.p[0], plan.D.sum(axis=3).argmax(axis=2)[:, 0])
 
     def start_ends(self) -> np.ndarray:
@@ -266,12 +269,17 @@ class Tracker:
             of the landing point they take on; one sample a millisecond and one beyond the end.
         """
         duration, target, landing = self._duration(leg, flight), flight.target, np.zeros(3)
-        region = self.plan.terrain.regions[flight.region]
+        region, rolled = self.plan.terrain.regions[flight.region], flight.target
         if flight.kind:  # a wheel lands moving with the robot, and rolls on until the slot ends
             com, com_velocity, _ = interpolate(self.plan, flight.start + flight.duration)
             along = region.tangent / region.tangent[0]
             landing = com_velocity[0] * along
             target = target - (interpolate(self.plan, flight.end)[0][0] - com[0]) * along
+        else:
+            roll = self._roll(leg, flight) * region.tangent
+            target = target - (1.0 - _room(region, target, roll[:2])) * roll
+            rolled = target + roll
+        self._extremes[leg] = target, rolled
         target = target + (RADII[flight.kind] - _PRESS) * region.normal
         # the larger of the two end effectors clears the ground by the swing height
         apex = self.plan.meta["swing_height"] + 0.5 * abs(RADII[flight.kind] - RADII[self._kinds[leg]])
@@ -284,6 +292,20 @@ class Tracker:
             path[d, :, 2] += duration * landing[2] * basis[:, 3]  # on a slope a wheel lands along the slope
             path[d, :, 3] = basis[:, 2]
         return path
+
+    def _roll(self, leg: int, flight: Swing) -> float:
+        """Return how far forward a foot will roll over its own roundness while it stands after a flight.
+
+        It is a centimetre and more where the robot walks past the foot. Near an edge the foot lands so much
+        before its place that it does not roll over.
+        """
+        later = self.flights[leg][self.lifted[leg] :]
+        until = later[0].start if later else self.plan.t[-1] - self.plan.t[0]
+        pitches = []
+        for t in (flight.end, until):
+            R_wb = rotation(self.lean.at(t)[0])
+            pitches.append(calf_pitch(flight.target - interpolate(self.plan, t)[0] - R_wb @ self._hips[leg]))
+        return FOOT_RADIUS * (pitches[1] - pitches[0])
 
     def _duration(self, leg: int, flight: Swing) -> float:
         """Return the time from a leg's actual lift-off to its planned landing."""
@@ -329,7 +351,7 @@ class Tracker:
             shift = across * (across @ error) * growth
             shift *= min(1.0, _FARTHEST_ASIDE / max(np.linalg.norm(shift), 1e-9))
             region = self.plan.terrain.regions[flight.region]
-            shift *= _room(region, flight.target, shift)
+            shift *= min(_room(region, point, shift) for point in self._extremes[leg])
             rise = -(region.normal[:2] @ shift) / region.normal[2]
             self._shift[leg] = [*shift, rise]
 
@@ -345,6 +367,6 @@ def _room(region: "Region", point: np.ndarray, shift: np.ndarray) -> float:
     """Return how much of a shift ``(2,)`` a point can make inside its region, 0 to 1 (Paper A, eq. 22)."""
     A, b = region.halfspaces
     outward = A @ shift
-    room = np.maximum(b - A @ point[:2], 0.0)
+    room = np.maximum(b - _OFF_EDGES - A @ point[:2], 0.0)
     leaving = outward > room
     return float(np.min(room[leaving] / outward[leaving], initial=1.0))
