@@ -12,8 +12,8 @@ import wfbook
 ROOT = Path(wfbook.__file__).parent
 ORDER = (
     "archive", "polygon", "terrain", "centroidal", "swing", "modes", "friction", "planner", "go1",
-    "go1_dynamics", "reference", "qp", "wbc", "sensors", "leg_odometry", "estimator", "tracking", "runs",
-    "simulate", "view", "report", "results", "arguments", "table2", "__main__",
+    "go1_dynamics", "reference", "qp", "wbc", "sensors", "leg_odometry", "estimator", "footing", "lean",
+    "tracking", "runs", "simulate", "view", "report", "results", "arguments", "table2", "__main__",
 )  # fmt: skip
 """The modules and packages, helpers before the chapter that they serve."""
 

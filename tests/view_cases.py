@@ -74,7 +74,14 @@ def small_run(settle: float = 0.1, shift: float = 0.003) -> Run:
     stance = plan.S.T[slot] == 0
     return Run(
         **dict(t=t, qpos=qpos, qvel=np.zeros((N, 22)), tau=np.zeros((N, 12)), tau_command=np.zeros((N, 12))),
-        **dict(com=com, com_velocity=0 * com, rpy=np.full((N, 3), 0.01), p=p, contact_force=plan.lam[knot]),
+        **dict(
+            com=com,
+            com_velocity=0 * com,
+            rpy=np.full((N, 3), 0.01),
+            rpy_ref=0 * com,
+            p=p,
+            contact_force=plan.lam[knot],
+        ),
         **dict(in_contact=stance, end_effector=kind.astype(np.int8), stance=stance, com_ref=com_ref),
         **dict(com_velocity_ref=0 * com, p_ref=p_ref, tick_ms=np.ones(N), metrics={}, meta={}),
         **dict(base_estimate=qpos[:, :7], base_velocity_estimate=np.zeros((N, 6)), com_estimate=com),

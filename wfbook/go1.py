@@ -73,6 +73,16 @@ def leg_angles(leg: int, end_b: np.ndarray) -> np.ndarray:
     return np.array([hip, np.arctan2(-x, depth) - calf / 2, calf])
 
 
+def calf_pitch(leg_w: np.ndarray) -> float:
+    """Return by how much a calf is turned about the y axis, zero where it hangs straight down.
+
+    Args:
+        leg_w: ``(3,)`` from where the thigh turns to the leg's end, in the world; the leg is not splayed.
+    """
+    reach = min(np.hypot(leg_w[0], leg_w[2]) / (2 * _LINK), 1.0)
+    return float(np.arctan2(-leg_w[0], -leg_w[2]) - np.arccos(reach))
+
+
 def leg_kinematics(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return where the legs' ends are in the trunk's frame, and how they and the calves move.
 

@@ -49,6 +49,18 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return (skew(a) @ b[..., None])[..., 0]
 
 
+def rotation(rpy: np.ndarray) -> np.ndarray:
+    """Return the rotation matrix ``(3, 3)`` with these roll, pitch and yaw: about x, then y, then z."""
+    return pin.rpy.rpyToMatrix(*np.asarray(rpy, float))
+
+
+def roll_pitch_yaw(R: np.ndarray) -> np.ndarray:
+    """Return roll, pitch and yaw of a rotation matrix, ``(3,)``."""
+    return np.array(
+        [np.arctan2(R[2, 1], R[2, 2]), -np.arcsin(np.clip(R[2, 0], -1, 1)), np.arctan2(R[1, 0], R[0, 0])]
+    )
+
+
 def contact_offsets(axles: np.ndarray, normals: np.ndarray, wheels: np.ndarray) -> np.ndarray:
     """Return the vectors from the legs' ends to the points that touch a plane.
 
@@ -235,7 +247,7 @@ class Go1Dynamics:
         Raises:
             ValueError: when a leg cannot reach.
         """
-        R_wb = pin.rpy.rpyToMatrix(*np.asarray(rpy, float))
+        R_wb = rotation(rpy)
         x, y, z, w = pin.Quaternion(R_wb).coeffs()
         qpos = np.zeros(23)
         qpos[:3] = com

@@ -66,12 +66,21 @@ class Ground:
     rolling_resistance: np.ndarray
 
     @classmethod
-    def under(cls, terrain: "Terrain", regions: np.ndarray) -> Self:
-        """Return the ground of four legs on four regions of a terrain, given by index."""
+    def under(cls, terrain: "Terrain", regions: np.ndarray, normals: np.ndarray | None = None) -> Self:
+        """Return the ground of four legs on a terrain.
+
+        Args:
+            terrain: to stand on.
+            regions: ``(4,)`` index of the region under each leg.
+            normals: ``(4, 3)`` where a leg stands on an edge; by default those of the regions.
+        """
         chosen = [terrain.regions[i] for i in regions]
+        if normals is None:
+            normals = np.array([r.normal for r in chosen])
+        tangents = np.array([1.0, 0.0, 0.0]) - normals[:, :1] * normals
         return cls(
-            np.array([r.normal for r in chosen]),
-            np.array([r.tangent for r in chosen]),
+            normals,
+            tangents / np.linalg.norm(tangents, axis=1, keepdims=True),
             np.array([r.mu_foot for r in chosen]),
             np.array([r.mu_wheel_lateral for r in chosen]),
             np.array([r.rolling_resistance for r in chosen]),
@@ -84,13 +93,14 @@ class Reference:
 
     Attributes:
         com, com_velocity, com_acceleration: ``(3,)`` of the centre of mass.
-        R_wb: ``(3, 3)`` orientation of the trunk; it is to rest.
+        R_wb: ``(3, 3)`` orientation of the trunk.
         ends, end_velocity, end_acceleration: ``(4, 3)`` of the legs' ends (centres of foot and wheel). For a
             swinging leg the path through the air; of a wheel on the ground only its place relative to ``com``
             is used.
         stance: ``(4,)`` bool, which legs carry load.
         wheels: ``(4,)`` bool, which legs stand, or would, on their wheel.
         forces: ``(4, 3)`` forces towards which λ is regularised.
+        omega: ``(3,)`` angular velocity of the trunk; by default it is to rest.
     """
 
     com: np.ndarray
@@ -103,3 +113,4 @@ class Reference:
     stance: np.ndarray
     wheels: np.ndarray
     forces: np.ndarray
+    omega: np.ndarray = field(default_factory=lambda: np.zeros(3))

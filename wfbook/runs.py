@@ -15,7 +15,7 @@ from wfbook.tracking import Swing
 if TYPE_CHECKING:
     from wfbook.planner.plan import Plan
 
-FORMAT = 2
+FORMAT = 3
 """Version of the run file; a file of another version is refused."""
 
 
@@ -40,6 +40,7 @@ class Run:
         in_contact: ``(N, 4)`` bool, whether a leg touches the ground.
         end_effector: ``(N, 4)`` int8, 0 foot and 1 wheel.
         stance: ``(N, 4)`` bool, whether a leg was commanded to carry load.
+        rpy_ref: ``(N, 3)`` roll, pitch, yaw it was to have.
         com_ref: ``(N, 3)`` planned centre of mass.
         com_velocity_ref: ``(N, 3)``.
         p_ref: ``(N, 4, 3)`` where the lowest points were to be.
@@ -56,7 +57,16 @@ class Run:
 
     LOGGED: ClassVar[tuple[str, ...]] = (
         *("t", "qpos", "qvel", "tau", "tau_command", "com", "com_velocity", "rpy", "p", "contact_force"),
-        *("in_contact", "end_effector", "stance", "com_ref", "com_velocity_ref", "p_ref", "tick_ms"),
+        *(
+            "in_contact",
+            "end_effector",
+            "stance",
+            "rpy_ref",
+            "com_ref",
+            "com_velocity_ref",
+            "p_ref",
+            "tick_ms",
+        ),
         *("base_estimate", "base_velocity_estimate", "com_estimate", "estimator_ms"),
     )
 
@@ -73,6 +83,7 @@ class Run:
     in_contact: np.ndarray
     end_effector: np.ndarray
     stance: np.ndarray
+    rpy_ref: np.ndarray
     com_ref: np.ndarray
     com_velocity_ref: np.ndarray
     p_ref: np.ndarray
@@ -116,6 +127,7 @@ def metrics_of(
     mass: float,
     work: np.ndarray,
     slip: float,
+    astray: float,
     fall_time: float | None,
     qp_failures: int,
     meta: dict[str, Any],
@@ -125,7 +137,9 @@ def metrics_of(
     Cost of transport is work over ``m g d`` from rest to rest, once with all work counted as cost
     (``cot_abs``) and once with only the work the motors put in (``cot_positive``). ``base_rms_m`` and
     ``base_rms_rad`` are root mean squares of the error's length from the plan's start on. ``slip_max_m`` is
-    how far a standing foot, or a wheel sideways, slid. ``lift_off_m`` is the largest clearance of each swing.
+    how far a standing foot, or a wheel sideways, slid; ``region_violation_max_m`` how far a standing foot was
+    beside its region, or a wheel beside all of its group. ``lift_off_m`` is the largest clearance of each
+    swing.
 
     Args:
         log: arrays of :class:`Run`.
@@ -134,6 +148,7 @@ def metrics_of(
         mass: of the robot.
         work: ``(2,)`` absolute and positive work of the motors.
         slip: the largest slip of a standing leg.
+        astray: the largest distance of a standing leg's contact from its regions.
         fall_time: when the robot fell, since the plan's start, or None.
         qp_failures: programs without a solution.
         meta: of the run.
@@ -142,7 +157,7 @@ def metrics_of(
     fell = fall_time is not None
     duration = float(plan.t[-1] - plan.t[0])
     error = (log["com"] - log["com_ref"])[going]
-    angles = log["rpy"][going]
+    angles = (log["rpy"] - log["rpy_ref"])[going]
     settled = log["com"][np.searchsorted(t, 0.0)] if going.any() else log["com"][-1]
     distance = float(np.linalg.norm((log["com"][-1] - settled)[:2]))
     weight_distance = mass * -GRAVITY[2] * max(distance, 1e-9)
@@ -171,6 +186,7 @@ def metrics_of(
         "base_rms_rpy_rad": np.sqrt(np.mean(angles**2, axis=0)).tolist() if going.any() else None,
         **_estimation(log, distance, meta),
         "slip_max_m": slip,
+        "region_violation_max_m": astray,
         "tick_ms_median": float(np.median(log["tick_ms"])),
         "tick_ms_p99": float(np.percentile(log["tick_ms"], 99)),
         "real_time_factor": simulated / meta["wall_time"],

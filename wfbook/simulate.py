@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wfbook.estimator import TOUCH, Estimator
-from wfbook.go1 import Go1
-from wfbook.go1_dynamics import MOTORS, WHEELS, Go1Dynamics
+from wfbook.go1 import RADII, Go1
+from wfbook.go1_dynamics import MOTORS, WHEELS, Go1Dynamics, roll_pitch_yaw
 from wfbook.modes import END_EFFECTORS, LEGS
 from wfbook.reference import Gains, Ground, Reference
 from wfbook.runs import Run, metrics_of
@@ -103,18 +103,19 @@ class _Execution:
         self.tracker = Tracker(plan, delay)
         self.step_time = float(self.robot.model.opt.timestep)
         kinds = np.array([END_EFFECTORS.index(name) for name in plan.meta["start_end_effectors"]])
-        qpos = self.dynamics.posture(plan.x[0], np.zeros(3), self.tracker.start_ends())
+        qpos = self.dynamics.posture(plan.x[0], self.tracker.lean.at(-SETTLE)[0], self.tracker.start_ends())
         qpos[1 + MOTORS] += 0.002 * np.random.default_rng(seed).standard_normal(12)
         self.robot.reset(qpos, kinds)
         self.estimator, self.sensors = estimator, Sensors(seed)
         if estimator is not None:
             self.truth.update(qpos, np.zeros(22))
             estimator.start(qpos[:3], self.sensors.tilted(self.truth.R_wb))
-        self.normals = self.tracker.start_normals()
+        self.normals = self.tracker.footing.normals
         self.log: dict[str, list] = {name: [] for name in Run.LOGGED}
         self.work = np.zeros(2)
         self.asked = np.zeros((4, 3))
         self.slip, self.slip_max, self.standing = np.zeros((4, 3)), 0.0, np.zeros(4, int)
+        self.astray = 0.0
         self.meta = {
             "delay": delay,
             "seed": seed,
@@ -161,6 +162,7 @@ class _Execution:
             self.dynamics.mass,
             self.work,
             self.slip_max,
+            self.astray,
             fall_time,
             self.controller.failures,
             self.meta,
@@ -203,6 +205,7 @@ class _Execution:
             "com": truth.com,
             "com_velocity": truth.com_velocity,
             "rpy": roll_pitch_yaw(truth.R_wb),
+            "rpy_ref": roll_pitch_yaw(ref.R_wb),
             "p": truth.centres + truth.contact_offsets(ground.normals, present),
             "contact_force": forces,
             "in_contact": loads > 1.0,
@@ -238,7 +241,10 @@ class _Execution:
         return known, known_velocity, elapsed
 
     def _slip(self, ground: Ground, ref: Reference, forces: np.ndarray) -> None:
-        """Add up how far standing feet slide, and wheels sideways; a foot's rolling is no slip."""
+        """Add up how far standing feet slide, and wheels sideways; a foot's rolling is no slip.
+
+        Also note how far their contacts are beside their regions.
+        """
         standing = ref.stance & (forces[:, 2] > TOUCH)
         self.standing = np.where(standing, self.standing + 1, 0)
         contact = contacts(self.truth, ground, ref.wheels)
@@ -247,6 +253,10 @@ class _Execution:
             self.standing[:, None] > 10, self.slip + _CONTROL_STEPS * self.step_time * velocity, 0.0
         )
         self.slip_max = max(self.slip_max, float(np.linalg.norm(self.slip, axis=1).max()))
+        for leg in np.flatnonzero(standing):
+            radius, rolls = RADII[int(ref.wheels[leg])], bool(ref.wheels[leg])
+            aside = self.tracker.footing.astray(leg, self.truth.centres[leg], radius, rolls)
+            self.astray = max(self.astray, aside)
 
     def _push(self, t: float) -> None:
         """Apply the push while it lasts."""
@@ -267,10 +277,3 @@ class _Execution:
         _w, x, y, _z = self.robot.data.qpos[3:7]
         upright = 1.0 - 2.0 * (x * x + y * y) > _FALLEN_TILT
         return not upright or self.robot.touches_with_hull()
-
-
-def roll_pitch_yaw(R: np.ndarray) -> np.ndarray:
-    """Return roll, pitch and yaw of a rotation matrix, ``(3,)``."""
-    return np.array(
-        [np.arctan2(R[2, 1], R[2, 2]), -np.arcsin(np.clip(R[2, 0], -1, 1)), np.arctan2(R[1, 0], R[0, 0])]
-    )

@@ -97,10 +97,24 @@ class Region:
         origin = self.vertices.mean(axis=0)
         return float(origin[2] - (n[0] * (x - origin[0]) + n[1] * (y - origin[1])) / n[2])
 
+    def outside(self, x: float, y: float) -> float:
+        """How far (x, y) is outside the polygon's farthest edge, seen from above; negative inside."""
+        A, b = self.halfspaces
+        return float((A @ (x, y) - b).max())
+
     def contains(self, x: float, y: float, tolerance: float = 1e-9) -> bool:
         """Whether (x, y) is inside the polygon or at most ``tolerance`` metres outside an edge."""
-        A, b = self.halfspaces
-        return bool(np.all(A @ (x, y) <= b + tolerance))
+        return self.outside(x, y) <= tolerance
+
+    def nearest(self, point: np.ndarray) -> np.ndarray:
+        """The polygon's point (3,) that is nearest to a point (3,) in space."""
+        below = point - self.normal @ (point - self.vertices[0]) * self.normal
+        if self.contains(below[0], below[1]):
+            return below
+        edges = np.roll(self.vertices, -1, axis=0) - self.vertices
+        along = ((point - self.vertices) * edges).sum(axis=1) / (edges**2).sum(axis=1)
+        on_edges = self.vertices + np.clip(along, 0.0, 1.0)[:, None] * edges
+        return on_edges[((on_edges - point) ** 2).sum(axis=1).argmin()]
 
     def to_dict(self) -> dict[str, Any]:
         """The region as plain JSON types, as it stands in a terrain file."""

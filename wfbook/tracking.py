@@ -20,8 +20,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wfbook.go1 import RADII
-from wfbook.go1_dynamics import GRAVITY, Go1Dynamics
+from wfbook.footing import Footing
+from wfbook.go1 import FOOT_RADIUS, RADII, calf_pitch, nominal
+from wfbook.go1_dynamics import GRAVITY, Go1Dynamics, rotation
+from wfbook.lean import Lean
 from wfbook.modes import END_EFFECTORS, LEGS
 from wfbook.reference import Ground, Reference
 from wfbook.swing import quintic_basis, swing_position
@@ -43,6 +45,7 @@ _PATIENCE = 0.05
 _COMMITTED = 0.9
 _FARTHEST_ASIDE = 0.06
 _SWITCH_ROOM = 0.004
+_OFF_EDGES = 0.005
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,6 @@ class Swing:
         target: ``(3,)`` contact point to land on.
         kind: end effector to land with, 0 foot, 1 wheel.
         region: to land on.
-        offset: ``(3,)`` of the landed contact point from the planned CoM, both at ``end``.
     """
 
     start: float
@@ -62,7 +64,6 @@ class Swing:
     target: np.ndarray
     kind: int
     region: int
-    offset: np.ndarray
 
     @property
     def duration(self) -> float:
@@ -79,15 +80,13 @@ def swings_of(plan: "Plan") -> list[list[Swing]]:
         padded = np.diff(np.concatenate([[0], plan.S[leg], [0]]))
         flights.append([])
         for first, after in zip(np.flatnonzero(padded == 1), np.flatnonzero(padded == -1), strict=True):
-            target = plan.p[after * rho, leg]
             flights[leg].append(
                 Swing(
                     float(plan.t[first * rho] - plan.t[0]),
                     float(plan.t[after * rho] - plan.t[0]),
-                    target,
+                    plan.p[after * rho, leg],
                     int(kinds[leg, after - 1]),
                     int(regions[leg, after - 1]),
-                    target - plan.x[after * rho],
                 )
             )
     return flights
@@ -118,11 +117,13 @@ class Tracker:
     Attributes:
         stance: ``(4,)`` bool, which legs are commanded to carry load now.
         lifted: how many flights each leg has begun, ``(4,)``.
+        footing: what is under each leg.
+        lean: the trunk's orientation.
     """
 
     def __init__(self, plan: "Plan", delay: float) -> None:
         self.plan, self.delay = plan, delay
-        self.flights = swings_of(plan)
+        self.flights, self.lean = swings_of(plan), Lean(plan)
         self.stance = np.ones(4, bool)
         self.lifted = np.zeros(4, int)
         self._from = np.zeros((4, 3))
@@ -130,22 +131,16 @@ class Tracker:
         self._searching_since = np.full(4, np.nan)
         self._last_touch = np.zeros(4)
         self._shift = np.zeros((4, 3))
+        self._extremes = np.zeros((4, 2, 3))
         self._start = np.zeros(4)
         kinds = [END_EFFECTORS.index(name) for name in plan.meta["start_end_effectors"]]
         self._kinds = np.array(kinds)
-        planned = plan.D.sum(axis=3).argmax(axis=2)[:, 0]
-        first = [self._region_of(plan.p[0, leg], int(planned[leg])) for leg in range(4)]
-        self._standing_on = np.array(first)
-        self._offsets = plan.p[0] - plan.x[0]
-        self._footholds = plan.p[0].copy()
+        self._hips = nominal()["hips"]
+        self.footing = Footing(plan.terrain, plan.p[0], plan.D.sum(axis=3).argmax(axis=2)[:, 0])
 
     def start_ends(self) -> np.ndarray:
         """Return the centres of the legs' ends in the plan's first posture, ``(4, 3)``."""
-        return self.plan.p[0] + RADII[self._kinds][:, None] * self.start_normals()
-
-    def start_normals(self) -> np.ndarray:
-        """Return the normals of the ground under the plan's first posture, ``(4, 3)``."""
-        return np.array([self.plan.terrain.regions[r].normal for r in self._standing_on])
+        return self.plan.p[0] + RADII[self._kinds][:, None] * self.footing.normals
 
     def update(
         self, t: float, robot: Go1Dynamics, touching: np.ndarray, forces: np.ndarray
@@ -167,19 +162,29 @@ class Tracker:
         ahead = interpolate(self.plan, t + self.delay)[2]
         for leg in range(4):
             self._advance(leg, t, bool(touching[leg]), ends[leg], robot.centre_velocity[leg])
-        rolling = self._kinds[:, None] == 1
-        p = np.where(rolling, self._offsets + com, self._footholds)
-        v, a = np.where(rolling, velocity, 0.0), np.zeros((4, 3))
+        p = np.zeros((4, 3))
+        for leg in np.flatnonzero(self.stance):
+            self.footing.stand(leg, ends[leg])
+            p[leg] = self._standing(leg, t, com) + RADII[self._kinds[leg]] * self.footing.normals[leg]
+        ground = self.footing.ground()
+        v, a = np.where(self._kinds[:, None] == 1, velocity, 0.0), np.zeros((4, 3))
         self._step_aside(t, robot, com, velocity)
-        terrain = self.plan.terrain
-        regions = self._ground_regions(ends)
-        ground = Ground.under(terrain, regions)
-        p += RADII[self._kinds][:, None] * ground.normals
         for leg in np.flatnonzero(~self.stance):
             p[leg], v[leg], a[leg] = self._in_the_air(leg, t, ground.normals[leg])
         wheels = self._kinds.astype(bool)
+        rpy, omega = self.lean.at(t)
         ref = Reference(
-            com, velocity, ahead, np.eye(3), p, v, a, self.stance.copy(), wheels, np.zeros((4, 3))
+            com,
+            velocity,
+            ahead,
+            rotation(rpy),
+            p,
+            v,
+            a,
+            self.stance.copy(),
+            wheels,
+            np.zeros((4, 3)),
+            omega,
         )
         return ref, ground
 
@@ -194,8 +199,7 @@ class Tracker:
         wanted = []
         for leg in np.flatnonzero(~self.stance & (self._kinds != present)):
             flight = self.flights[leg][self.lifted[leg] - 1]
-            region = self.plan.terrain.regions[self._region_of(ends[leg], flight.region)]
-            room = (ends[leg, 2] - region.height(*ends[leg, :2])) * region.normal[2]
+            room = min(np.linalg.norm(ends[leg] - r.nearest(ends[leg])) for r in self.plan.terrain.regions)
             if t >= flight.start + 0.4 * flight.duration and room > RADII[self._kinds[leg]] + _SWITCH_ROOM:
                 wanted.append((LEGS[leg], END_EFFECTORS[self._kinds[leg]]))
         return wanted
@@ -209,7 +213,8 @@ class Tracker:
             self.stance[leg] = False
             self._start[leg] = max(t, flight.start)
             self._paths[leg] = self._flight_path(flight, leg, end, velocity)
-            self._kinds[leg], self._standing_on[leg] = flight.kind, flight.region
+            self._kinds[leg] = flight.kind
+            self.footing.land(leg, flight.region)
             self._searching_since[leg] = np.nan
             self._shift[leg] = 0.0
             return
@@ -225,8 +230,20 @@ class Tracker:
         if falling and touching:
             self.stance[leg] = True
             self._searching_since[leg] = np.nan
-            if flight is not None:
-                self._offsets[leg], self._footholds[leg] = flight.offset, flight.target
+
+    def _standing(self, leg: int, t: float, com: np.ndarray) -> np.ndarray:
+        """Return where a standing leg's contact point is to be, ``(3,)``; a rolling one goes with the CoM.
+
+        A leg that landed early stands as it will by plan, one that lifts late as it stood before.
+        """
+        flights, count = self.flights[leg], self.lifted[leg]
+        t = max(t, flights[count - 1].end) if count else t
+        t = min(t, flights[count].start) if count < len(flights) else t
+        plan = self.plan
+        place = np.clip(t / plan.dt, 0.0, plan.knots)
+        k = min(int(place), plan.knots - 1)
+        p, x = (array[k] + (place - k) * (array[k + 1] - array[k]) for array in (plan.p[:, leg], plan.x))
+        return p + com - x if self._kinds[leg] else p
 
     def _may_lift(self, leg: int, t: float) -> bool:
         """Whether a leg due to lift leaves two others standing; if not, it waits for late ones a little."""
@@ -252,20 +269,43 @@ class Tracker:
             of the landing point they take on; one sample a millisecond and one beyond the end.
         """
         duration, target, landing = self._duration(leg, flight), flight.target, np.zeros(3)
+        region, rolled = self.plan.terrain.regions[flight.region], flight.target
         if flight.kind:  # a wheel lands moving with the robot, and rolls on until the slot ends
             com, com_velocity, _ = interpolate(self.plan, flight.start + flight.duration)
-            landing[0] = com_velocity[0]
-            target = target - np.array([interpolate(self.plan, flight.end)[0][0] - com[0], 0.0, 0.0])
-        target = target + (RADII[flight.kind] - _PRESS) * self.plan.terrain.regions[flight.region].normal
+            along = region.tangent / region.tangent[0]
+            landing = com_velocity[0] * along
+            target = target - (interpolate(self.plan, flight.end)[0][0] - com[0]) * along
+        else:
+            roll = self._roll(leg, flight) * region.tangent
+            target = target - (1.0 - _room(region, target, roll[:2])) * roll
+            rolled = target + roll
+        self._extremes[leg] = target, rolled
+        target = target + (RADII[flight.kind] - _PRESS) * region.normal
         # the larger of the two end effectors clears the ground by the swing height
         apex = self.plan.meta["swing_height"] + 0.5 * abs(RADII[flight.kind] - RADII[self._kinds[leg]])
         count = round(duration / _SAMPLE) + 2
         phase = np.minimum(np.arange(count) * _SAMPLE / duration, 1.0)
         path = np.empty((3, count, 4))
         for d in range(3):
+            basis = quintic_basis(phase, d) / duration**d
             path[d, :, :3] = swing_position(phase, duration, start, target, apex, velocity, landing, d)
-            path[d, :, 3] = quintic_basis(phase, d)[:, 2] / duration**d
+            path[d, :, 2] += duration * landing[2] * basis[:, 3]  # on a slope a wheel lands along the slope
+            path[d, :, 3] = basis[:, 2]
         return path
+
+    def _roll(self, leg: int, flight: Swing) -> float:
+        """Return how far forward a foot will roll over its own roundness while it stands after a flight.
+
+        It is a centimetre and more where the robot walks past the foot. Near an edge the foot lands so much
+        before its place that it does not roll over.
+        """
+        later = self.flights[leg][self.lifted[leg] :]
+        until = later[0].start if later else self.plan.t[-1] - self.plan.t[0]
+        pitches = []
+        for t in (flight.end, until):
+            R_wb = rotation(self.lean.at(t)[0])
+            pitches.append(calf_pitch(flight.target - interpolate(self.plan, t)[0] - R_wb @ self._hips[leg]))
+        return FOOT_RADIUS * (pitches[1] - pitches[0])
 
     def _duration(self, leg: int, flight: Swing) -> float:
         """Return the time from a leg's actual lift-off to its planned landing."""
@@ -311,23 +351,9 @@ class Tracker:
             shift = across * (across @ error) * growth
             shift *= min(1.0, _FARTHEST_ASIDE / max(np.linalg.norm(shift), 1e-9))
             region = self.plan.terrain.regions[flight.region]
-            shift *= _room(region, flight.target, shift)
+            shift *= min(_room(region, point, shift) for point in self._extremes[leg])
             rise = -(region.normal[:2] @ shift) / region.normal[2]
             self._shift[leg] = [*shift, rise]
-
-    def _region_of(self, point: np.ndarray, default: int) -> int:
-        """Return the region below a point, or the default where there is none."""
-        terrain = self.plan.terrain
-        if len(terrain.regions) == 1:
-            return 0
-        index = terrain.region_at(float(point[0]), float(point[1]))
-        return default if index is None else index
-
-    def _ground_regions(self, ends: np.ndarray) -> np.ndarray:
-        """Return what each leg stands on, ``(4,)``: wheels roll from region to region."""
-        for leg in np.flatnonzero(self.stance & (self._kinds == 1)):
-            self._standing_on[leg] = self._region_of(ends[leg], int(self._standing_on[leg]))
-        return self._standing_on
 
 
 def _sampled(path: np.ndarray, elapsed: float) -> np.ndarray:
@@ -341,6 +367,6 @@ def _room(region: "Region", point: np.ndarray, shift: np.ndarray) -> float:
     """Return how much of a shift ``(2,)`` a point can make inside its region, 0 to 1 (Paper A, eq. 22)."""
     A, b = region.halfspaces
     outward = A @ shift
-    room = np.maximum(b - A @ point[:2], 0.0)
+    room = np.maximum(b - _OFF_EDGES - A @ point[:2], 0.0)
     leaving = outward > room
     return float(np.min(room[leaving] / outward[leaving], initial=1.0))

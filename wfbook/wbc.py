@@ -77,7 +77,7 @@ def base_acceleration(robot: Go1Dynamics, ref: Reference, gains: Gains) -> tuple
     E = ref.R_wb @ robot.R_wb.T
     error = 0.5 * np.array([E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]])  # sin(angle) · axis
     omega = robot.R_wb @ robot.velocity[3:6]
-    return linear, gains.attitude_kp * error - gains.attitude_kd * omega
+    return linear, gains.attitude_kp * error + gains.attitude_kd * (ref.omega - omega)
 
 
 def wheel_acceleration(robot: Go1Dynamics, ref: Reference, along: np.ndarray, gains: Gains) -> np.ndarray:

@@ -117,15 +117,9 @@ def settle(problem: Problem, values: dict[Any, np.ndarray], p: np.ndarray) -> di
             states = {r: value[leg, j] for r, value in here.items()}
             free = [r for r, state in states.items() if np.isnan(state)]
             point = p[i + 1 + rho * j, leg, :2]
-            distances = [_outside(regions[r].halfspaces, point) for r in free]
+            distances = [regions[r].outside(*point) for r in free]
             nearest = free[int(np.argmin(distances))]
             taken = any(state == 1 for state in states.values())
             for r in free:
                 here[r][leg, j] = float(r == nearest and not taken)
     return settled
-
-
-def _outside(halfspaces: tuple[np.ndarray, np.ndarray], point: np.ndarray) -> float:
-    """Return by how much a point is outside of a polygon; negative inside."""
-    A, b = halfspaces
-    return float((A @ point - b).max())

@@ -4,7 +4,7 @@ The relaxation of eq. 9 lets the program buy torque that no contact makes, and i
 from it fall. With the binaries fixed, the only non-convexity left is the product of lever and force.
 It is linearised about the last plan, inside a trust region; a few small QPs bring the true torque of
 eq. 8 into agreement with the rotation. What comes out adds the sideways sway that the relaxed plan
-did without.
+did without, and keeps footholds off the edges of their regions.
 """
 
 from dataclasses import replace
@@ -17,8 +17,10 @@ from wfbook.centroidal import contact_torque
 from wfbook.planner import tight
 from wfbook.planner.conic import Conic
 from wfbook.planner.contacts import assignment
-from wfbook.planner.crossings import settle
+from wfbook.planner.crossings import Crossings, settle
+from wfbook.planner.edges import kept_off
 from wfbook.planner.extract import fill, gait_of, plan_of, problem_of, read
+from wfbook.planner.gait import Gait
 from wfbook.planner.plan import Plan
 from wfbook.planner.presolve import solve_fixed
 from wfbook.planner.problem import Problem
@@ -32,6 +34,9 @@ PRICE = 1000.0
 
 It must exceed what such torque earns anywhere, or a goal farther than the gait can go buys it.
 """
+
+EDGE_PRICE = 20.0
+"""Of a metre that a contact is too near to an edge, besides what it could earn at the goal."""
 
 TOLERANCE_NM = 1e-3
 """The largest true torque mismatch at which the iteration ends."""
@@ -58,6 +63,10 @@ class Polisher:
         squares = sum(cp.sum_squares(z) for z in (*self._lever, *self._force))
         cost = motion_cost(program) + 4 * problem.weights.bounds * squares
         cost += PRICE * sum(cp.norm1(s) for s in self._slack)
+        self._short = cp.Variable((problem.legs, problem.slots))
+        away = float(np.linalg.norm(np.subtract(problem.goal, problem.start)))
+        cost += (EDGE_PRICE + 2 * problem.weights.goal * away) * cp.sum(self._short)
+        ties.append(self._short >= 0)
         self._conic = Conic.compile(cost, program.rows(without=("torque", "torque bounds")) + ties)
         self._program_columns = {key: self._conic.columns(v) for key, v in program.discrete.items()}
 
@@ -71,16 +80,16 @@ class Polisher:
             The polished plan. ``meta["torque_mismatch_nm"]`` holds the rms per axis of what is left,
             ``meta["relaxed_torque_mismatch_nm"]`` that of the relaxed plan; :func:`repaired` judges.
         """
-        problem, weight, conic = self.problem, self.problem.robot.weight, self._conic
+        weight, conic = self.problem.robot.weight, self._conic
         gait = gait_of(plan)
-        known = settle(problem, assignment(problem, gait, self.program.discrete), plan.p)
-        columns = np.concatenate([self._program_columns[key].ravel() for key in self.program.discrete])
-        fixed = np.concatenate([known[key].ravel() for key in self.program.discrete])
+        columns, fixed = self._binaries(gait, plan.p)
+        off_edges = self._off_edges(gait)
         lever, force = _middle_levers(plan), [plan.lam[..., i] / weight for i in range(3)]
         radius, best, merit, steps = np.array([0.05, 0.25]), None, np.inf, 0
+        cost = np.inf
         while steps < _ITERATIONS:
             steps += 1
-            found = solve_fixed(self._linearised(lever, force, radius), columns, fixed)
+            found = solve_fixed(self._linearised(lever, force, radius, off_edges), columns, fixed)
             if found.status != "solved":
                 # The relaxed plan may lie outside the polish's rows by a solver's tolerance.
                 if best is not None or radius[0] > 0.4:
@@ -92,11 +101,17 @@ class Polisher:
             mismatch = self._mismatch(new_lever, new_force, found.y)
             slack = sum(np.abs(conic.value(s, found.y)).sum() for s in self._slack)
             value = found.value + PRICE * (np.abs(mismatch).sum() - slack)
-            if value < merit - 1e-9 or best is None:
-                progress = merit - value
-                lever, force, merit, best = new_lever, new_force, value, found.y
-                radius = radius * 1.5
-                if weight * np.abs(mismatch).max() < TOLERANCE_NM and progress < 1e-4 * abs(merit):
+            expected, progress = merit - found.value, merit - value
+            if progress > 1e-9:
+                # Where the linearisation promises much more than comes true, it reaches too far.
+                if best is not None and progress < 0.25 * expected:
+                    moved = [_farthest(new_lever, lever), _farthest(new_force, force)]
+                    radius = 0.5 * np.minimum(radius, moved)
+                else:
+                    radius = radius * 1.5
+                settled = abs(found.value - cost) < 1e-4 * abs(cost)
+                lever, force, merit, cost, best = new_lever, new_force, value, found.value, found.y
+                if settled and weight * np.abs(mismatch).max() < TOLERANCE_NM:
                     break
             else:
                 radius = radius * 0.3
@@ -106,8 +121,46 @@ class Polisher:
             return plan.with_meta(stage="polished", status="polish failed", torque_mismatch_nm=[np.inf] * 3)
         return self._plan(plan, best, steps)
 
-    def _linearised(self, lever: list[np.ndarray], force: list[np.ndarray], radius: np.ndarray) -> Conic:
-        """Return the QP with eq. 8 linearised about a plan, inside a trust region."""
+    def _binaries(self, gait: Gait, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the columns of the discrete variables and their values.
+
+        Between which knots wheels cross edges is read off the plan. A wheel that stood on an edge at a knot
+        was in either region, and the wrong one may leave no motion: then it is searched for.
+        """
+        keys = self.program.discrete
+        columns = np.concatenate([self._program_columns[key].ravel() for key in keys])
+        open_ = assignment(self.problem, gait, keys)
+        values = np.concatenate([open_[key].ravel() for key in keys])
+        if not np.isnan(values).any():
+            return columns, values
+        known = settle(self.problem, open_, p)
+        settled = np.concatenate([known[key].ravel() for key in keys])
+        if solve_fixed(self._conic, columns, settled).status != "solved":
+            found = Crossings(self.program, self._conic).solve(columns, values, np.inf, quick=True)
+            if np.isfinite(found.value):
+                settled = np.rint(found.y[columns])
+        return columns, settled
+
+    def _off_edges(self, gait: Gait) -> tuple[sparse.csc_matrix, np.ndarray]:
+        """Return rows and right-hand sides that keep contacts off edges, as far as ``_short`` allows."""
+        problem, conic = self.problem, self._conic
+        edges = list(kept_off(problem, gait))
+        p = [conic.columns(c).reshape(problem.knots + 1, problem.legs) for c in self.program.p[:2]]
+        short = conic.columns(self._short).reshape(problem.legs, problem.slots)
+        rows = sparse.lil_matrix((len(edges), conic.A.shape[1]))
+        for row, (leg, slot, a, _) in enumerate(edges):
+            knot = problem.knots_per_slot * (slot + 1)
+            rows[row, [p[0][knot, leg], p[1][knot, leg], short[leg, slot]]] = [*a, -1.0]
+        return rows.tocsc(), np.array([edge.b for edge in edges])
+
+    def _linearised(
+        self,
+        lever: list[np.ndarray],
+        force: list[np.ndarray],
+        radius: np.ndarray,
+        off_edges: tuple[sparse.csc_matrix, np.ndarray],
+    ) -> Conic:
+        """Return the QP with eq. 8 linearised about a plan, inside a trust region, contacts off edges."""
         conic, problem = self._conic, self.problem
         n, K = conic.A.shape[1], problem.knots
         inertia = problem.robot.inertia / problem.robot.weight
@@ -142,7 +195,8 @@ class Polisher:
         centre = np.concatenate([c.ravel() for c in (*lever, *force)])
         size = np.repeat(radius, len(boxed) // 2)
         pick = sparse.csc_matrix((np.ones(len(boxed)), (np.arange(len(boxed)), boxed)), shape=(len(boxed), n))
-        below, limit = sparse.vstack([pick, -pick]), np.concatenate([centre + size, size - centre])
+        below = sparse.vstack([pick, -pick, off_edges[0]])
+        limit = np.concatenate([centre + size, size - centre, off_edges[1]])
         return conic.with_rows(equal, np.concatenate(right), below, limit)
 
     def _mismatch(self, lever: list[np.ndarray], force: list[np.ndarray], y: np.ndarray) -> np.ndarray:
@@ -198,6 +252,10 @@ def torque_mismatch(plan: Plan) -> np.ndarray:
 def repaired(plan: Plan) -> bool:
     """Tell whether a polished plan's torque is true to 0.1 N m rms on every axis."""
     return bool(np.max(plan.meta["torque_mismatch_nm"]) <= ACCEPTED_NM)
+
+
+def _farthest(new: list[np.ndarray], old: list[np.ndarray]) -> float:
+    return float(max(np.abs(a - b).max() for a, b in zip(new, old, strict=True)))
 
 
 def _middle_levers(plan: Plan) -> list[np.ndarray]:

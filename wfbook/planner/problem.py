@@ -267,15 +267,11 @@ class Problem:
 
     def _moved_in(self, x: float, y: float, z: float) -> np.ndarray:
         """Return a contact moved onto and into the region it is on, if solver's tolerance left it outside."""
-        point, index = np.array([x, y]), self.terrain.region_at(x, y, _ON_GROUND)
-        if index is None:
-            return np.array([x, y, z])
-        region = self.terrain.regions[index]
-        A, b = region.halfspaces
-        for normal, limit in zip(A, b, strict=True):
-            point = point - max(normal @ point - limit, 0.0) * normal
-        height = region.height(*point)
-        return np.array([*point, height if abs(height - z) <= _ON_GROUND else z])
+        index = self.terrain.region_at(x, y, _ON_GROUND)
+        point = np.array([x, y, z])
+        if index is None or abs(self.terrain.regions[index].height(x, y) - z) > _ON_GROUND:
+            return point
+        return self.terrain.regions[index].nearest(point)
 
     @property
     def start_contacts(self) -> np.ndarray:

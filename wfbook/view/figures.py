@@ -201,7 +201,7 @@ def tracking(run: "Run") -> Picture:
     for i, (name, style) in enumerate(zip(_COMPONENTS, ("-", "--", ":"), strict=True)):
         top.plot(run.t, error_mm[:, i], color=MEASURED, linestyle=style, linewidth=1.2, label=name, gid=name)
     for i, (name, style) in enumerate(zip(_AXES, ("-", "--", ":"), strict=True)):
-        angle_deg = np.rad2deg(run.rpy[:, i])
+        angle_deg = np.rad2deg(run.rpy[:, i] - run.rpy_ref[:, i])
         bottom.plot(run.t, angle_deg, color=MEASURED, linestyle=style, linewidth=1.2, label=name, gid=name)
     top.set_ylabel("CoM error (mm)")
     bottom.set_ylabel("attitude (°)")

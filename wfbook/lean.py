@@ -1,0 +1,56 @@
+"""Chapter 8: how the trunk leans with the ground.
+
+The planner knows a body with four reach boxes and keeps it level. A level trunk above a slope has its uphill
+legs folded and its downhill legs stretched: on 12 degrees the uphill knees touch the ground. The
+controller therefore turns the trunk with the plane of the planned footholds. The centre of mass and the
+contacts stay where the plan has them.
+"""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from wfbook.planner.plan import Plan
+
+_SPLINE = (
+    np.array([[1.0, 4.0, 1.0, 0.0], [-3.0, 0.0, 3.0, 0.0], [3.0, -6.0, 3.0, 0.0], [-1.0, 3.0, -3.0, 1.0]]) / 6
+)
+"""Row i holds the factors of s^i for the four control values of a uniform cubic B-spline."""
+
+
+class Lean:
+    """The trunk's orientation over time: smooth, and at rest where the ground's slope does not change.
+
+    The control values of a cubic B-spline are the slopes of the planes through the four contacts where slots
+    begin and end. Such a curve has a continuous acceleration and foresees the next slope by a slot.
+
+    Args:
+        plan: whose footholds are followed.
+    """
+
+    def __init__(self, plan: "Plan") -> None:
+        places = plan.p[:: plan.knots // plan.slots]
+        self._slot = plan.slot_duration
+        self._angles = np.array([_angles(contacts) for contacts in places])
+
+    def at(self, t: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the trunk's orientation and angular velocity at a time since the plan's start.
+
+        Returns:
+            Roll, pitch and yaw, ``(3,)``; angular velocity ``(3,)`` in the world.
+        """
+        j = int(np.floor(t / self._slot))
+        s = t / self._slot - j
+        control = self._angles[np.clip(j + np.arange(-1, 3), 0, len(self._angles) - 1)]
+        roll, pitch = np.array([1.0, s, s * s, s**3]) @ _SPLINE @ control
+        roll_rate, pitch_rate = np.array([0.0, 1.0, 2 * s, 3 * s * s]) @ _SPLINE @ control / self._slot
+        omega = np.array([roll_rate * np.cos(pitch), pitch_rate, -roll_rate * np.sin(pitch)])
+        return np.array([roll, pitch, 0.0]), omega
+
+
+def _angles(contacts: np.ndarray) -> tuple[float, float]:
+    """Return roll and pitch of the plane that comes closest to four points ``(4, 3)``."""
+    away = contacts - contacts.mean(axis=0)
+    (rise_x, rise_y), *_ = np.linalg.lstsq(away[:, :2], away[:, 2])
+    return np.arcsin(rise_y / np.sqrt(1.0 + rise_x**2 + rise_y**2)), -np.arctan(rise_x)

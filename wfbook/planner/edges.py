@@ -1,0 +1,75 @@
+"""How far contacts keep from the edges of their regions.
+
+A plan may put a foothold on the very edge of a stone, which is inside it (eq. 22). A robot may not: its foot
+rolls forward by a centimetre while it stands, and lands where the controller can put it. The same holds
+for a wheel at an edge beyond which its group does not go on. Beside a step up there must be room for the foot
+itself, and for the calf above it.
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from wfbook.planner.gait import Gait
+from wfbook.planner.problem import Problem
+
+MARGIN = 0.015
+"""How far inside, where there is room."""
+
+STEP_MARGIN = 0.04
+"""How far from a step up to a neighbour."""
+
+_BEYOND = 2e-3
+_STEP = 5e-3
+_ALONG = (0.1, 0.3, 0.5, 0.7, 0.9)
+
+
+class Edge(NamedTuple):
+    """A half-plane ``a · (p_x, p_y) ≤ b`` in which a contact should be when a slot ends.
+
+    Attributes:
+        leg: index.
+        slot: index.
+        a: ``(2,)``.
+        b: already less the margin.
+    """
+
+    leg: int
+    slot: int
+    a: np.ndarray
+    b: float
+
+
+def kept_off(problem: Problem, gait: Gait) -> Iterator[Edge]:
+    """Yield the half-planes of all contacts that a gait can still move: landings, and wheels that roll."""
+    for leg, slot in np.argwhere((gait.S == 1) | (gait.wheel == 1)):
+        region, wheel = int(gait.region[leg, slot]), bool(gait.wheel[leg, slot])
+        for i, (a, b) in enumerate(zip(*problem.terrain.regions[region].halfspaces, strict=True)):
+            if not (wheel and _goes_on(problem, region, i)):
+                margin = STEP_MARGIN if _rises(problem, region, i) else MARGIN
+                yield Edge(int(leg), int(slot), a, float(b) - margin)
+
+
+def _goes_on(problem: Problem, region: int, edge: int) -> bool:
+    """Whether another region of the group lies beyond the middle of an edge."""
+    (x, y), regions = _beyond(problem, region, edge, 0.5), problem.terrain.regions
+    group = problem.ground.groups[problem.ground.group_of[region]]
+    return any(regions[other].contains(x, y) for other in group if other != region)
+
+
+def _rises(problem: Problem, region: int, edge: int) -> bool:
+    """Whether the ground is higher anywhere beyond an edge."""
+    for share in _ALONG:
+        x, y = _beyond(problem, region, edge, share)
+        height = problem.terrain.height(x, y)
+        if height is not None and height > problem.terrain.regions[region].height(x, y) + _STEP:
+            return True
+    return False
+
+
+def _beyond(problem: Problem, region: int, edge: int, share: float) -> np.ndarray:
+    """Return a point ``(2,)`` just beyond an edge of a region, a share of the way along it."""
+    region = problem.terrain.regions[region]
+    here, there = region.vertices[edge, :2], region.vertices[(edge + 1) % len(region.vertices), :2]
+    return here + share * (there - here) + _BEYOND * region.halfspaces[0][edge]
