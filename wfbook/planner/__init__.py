@@ -6,14 +6,19 @@ the fast one. :mod:`.conic` compiles them for Clarabel, :mod:`.presolve` removes
 :mod:`.crossings` finds where wheels cross edges; :mod:`.relaxation` bounds cheaply, :mod:`.bounds` narrows.
 :mod:`.gait`, :mod:`.boxes` and :mod:`.symmetry` are the logic of gaits. :mod:`.kernel` bounds and prices, on
 two cores with :mod:`.worker`; :mod:`.gaits` guesses, :mod:`.branching` splits, :mod:`.tree` lets SCIP search
-by its :mod:`.plugins`, :mod:`.explain` says why there is nothing to find. :mod:`.extract` reads the solution,
-:mod:`.polish` makes it true, :mod:`.plan` keeps it, :mod:`.windows` plans far.
+by its :mod:`.plugins`. :mod:`.extract` reads the solution, :mod:`.polish` makes it true, :mod:`.plan` keeps
+it, :mod:`.windows` plans far.
+
+:mod:`.explain` says why there is nothing to find: :mod:`.elastic` answers, on a :mod:`.wide` problem and with
+:mod:`.feasibility`, what would be possible without some limits; :mod:`.reasons` and :mod:`.neighbours` name
+what is to blame.
 """
 
 from wfbook.planner.explain import InfeasibleError, NoPlanError
 from wfbook.planner.plan import Plan
 from wfbook.planner.polish import polish, repaired, torque_mismatch
 from wfbook.planner.problem import InitialState, Limits, Problem, Weights
+from wfbook.planner.reasons import Reason
 from wfbook.planner.solve import solve, solve_executable
 from wfbook.planner.tree import Progress
 from wfbook.planner.windows import solve_windows
@@ -26,6 +31,7 @@ __all__ = [
     "Plan",
     "Problem",
     "Progress",
+    "Reason",
     "Weights",
     "polish",
     "repaired",

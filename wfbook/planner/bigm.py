@@ -20,7 +20,7 @@ import numpy as np
 
 from wfbook.friction import friction_pyramid, rolling_friction
 from wfbook.planner.bounds import MotionBounds
-from wfbook.planner.explain import InfeasibleError, NoPlanError, conflicting_groups
+from wfbook.planner.explain import NoPlanError, check_start, why_not
 from wfbook.planner.extract import plan_of, read
 from wfbook.planner.gait import Gait
 from wfbook.planner.ground import Places, Surface
@@ -318,8 +318,7 @@ def gait_of(program: Program) -> Gait:
 def solve(problem: Problem, gap: float, time_limit: float) -> Plan:
     """Give the paper's program to SCIP through CVXPY (see :func:`wfbook.planner.solve`)."""
     begin = time.perf_counter()
-    if not problem.start_in_reach:
-        raise InfeasibleError(conflicting_groups(problem))
+    check_start(problem)
     program = build(problem)
     stated = cp.Problem(cp.Minimize(program.cost), program.rows())
     data, chain, inverse = stated.get_problem_data(cp.SCIP)
@@ -330,7 +329,7 @@ def solve(problem: Problem, gap: float, time_limit: float) -> Plan:
     model = answer["model"]
     if model.getNSols() == 0:
         if model.getStatus() == "infeasible":
-            raise InfeasibleError(conflicting_groups(problem))
+            raise why_not(problem)
         if model.getStatus() == "userinterrupt":
             raise KeyboardInterrupt
         raise NoPlanError(f"no plan found within {spent:.1f} s")

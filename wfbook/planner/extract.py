@@ -121,6 +121,7 @@ def describe(problem: Problem) -> dict[str, Any]:
             "stance_between_swings": problem.stance_between_swings,
             "final_stance": problem.final_stance,
             "beyond_reach": problem.beyond_reach,
+            "goal_tolerance": problem.goal_tolerance and list(map(float, problem.goal_tolerance)),
         },
     }
 
@@ -150,6 +151,8 @@ def problem_of(plan: Plan) -> Problem:
         )
         limits = {k: tuple(v) if isinstance(v, list) else v for k, v in meta["limits"].items()}
         options = meta["options"] | {"patterns": tuple(map(tuple, meta["options"]["patterns"]))}
+        if options.get("goal_tolerance"):
+            options["goal_tolerance"] = tuple(options["goal_tolerance"])
         return Problem(
             plan.terrain,
             goal=tuple(meta["goal"]),

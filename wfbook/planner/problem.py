@@ -108,7 +108,7 @@ class Problem:
 
     Attributes:
         terrain: the regions that may be touched.
-        goal: ``(x, y)`` where the centre of mass should be at the end; a cost, not a constraint.
+        goal: ``(x, y)`` where the centre of mass should be at the end; a cost.
         slots: number of slots ``N_j``; in each, a leg either swings or stands.
         slot_duration: of one slot, in seconds.
         knots_per_slot: the paper's ρ.
@@ -122,6 +122,7 @@ class Problem:
         stance_between_swings: a leg that landed must stand for a slot before it swings again.
         final_stance: all legs stand in the last slot, at rest, one of them on a foot.
         beyond_reach: accept a goal farther than top speed can bring the robot (section IV-B does).
+        goal_tolerance: how far from the goal the centre of mass may end, along x and y; default: anywhere.
         robot: mass, inertia and reach boxes.
         weights: of the cost.
         limits: of motion and force.
@@ -144,6 +145,7 @@ class Problem:
     stance_between_swings: bool = True
     final_stance: bool = True
     beyond_reach: bool = False
+    goal_tolerance: tuple[float, float] | None = None
     robot: Robot = field(default_factory=Robot.go1)
     weights: Weights = field(default_factory=Weights)
     limits: Limits = field(default_factory=Limits)
@@ -159,6 +161,9 @@ class Problem:
             value = getattr(self, name)
             if np.shape(value) != (2,) or not np.isfinite(np.asarray(value, float)).all():
                 raise ValueError(f"{name}: {value!r} is not a pair of finite numbers")
+        near = self.goal_tolerance
+        if near is not None and (np.shape(near) != (2,) or not all(0 < t < np.inf for t in near)):
+            raise ValueError(f"goal_tolerance: {near!r} is not a pair of positive numbers")
         if np.shape(self.start_offsets) != (len(LEGS), 2) or not np.isfinite(self.start_offsets).all():
             raise ValueError(f"start_offsets: not a finite array of shape {(len(LEGS), 2)}")
         if "foot" not in self.end_effectors or not set(self.end_effectors) <= set(END_EFFECTORS):

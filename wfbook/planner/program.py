@@ -36,6 +36,7 @@ class Program:
         ground: height of the ground under the legs, the mean over legs, ``(K+1,)`` or a number.
         lever: ``p − x`` at mid-interval, components of shape ``(K, L)``.
         discrete: the variables that must be integers, by name.
+        contacts: what those say of regions; of the tight formulation only.
     """
 
     problem: Problem
@@ -58,6 +59,7 @@ class Program:
     cost: Any = None
     lever: list[Any] = field(default_factory=list)
     discrete: dict[Any, Any] = field(default_factory=dict)
+    contacts: Any = None
 
     def add(self, group: str, *constraints: Any) -> None:
         """Add constraints to a group."""
@@ -150,20 +152,39 @@ def common(
         program.add("torque", torque == 0.25 * (total[0][i] - total[1][i]))
     program.add("rotation", *(r == 0 for r in midpoint_integration(theta, omega, alpha, dt)))
 
-    lever = [p[i] - cp.reshape(x[i], (K + 1, 1), order="C") @ np.ones((1, L)) for i in range(3)]
-    middle = program.lever = [0.5 * (r[1:] + r[:-1]) for r in lever]
+    middle = program.lever = [0.5 * (r[1:] + r[:-1]) for r in levers(program)]
     for side, terms in zip(bounds, bound_terms(middle, force), strict=True):
         for u, pair in zip(side, terms, strict=True):
             program.add("torque bounds", *_above_squares(u, pair, per_leg))
 
+    bound(program, problem)
+    program.cost = motion_cost(program) + problem.weights.bounds * sum(
+        cp.sum(U) for U in (*total[0], *total[1])
+    )
+    return program
+
+
+def bound(program: Program, problem: Problem) -> None:
+    """State where a program starts and ends, how far its legs reach and how fast it may be (eq. 30).
+
+    The first word of a group's name says what it is, the second which of its kind.
+
+    Args:
+        program: with its motion.
+        problem: whose limits hold; may be another than the program was built for.
+    """
+    x, v, p, theta, omega = program.x, program.v, program.p, program.theta, program.omega
+    K, lever = problem.knots, levers(program)
     robot, limits = problem.robot, problem.limits
     ones = np.ones((K, 1))
-    for i in range(3):  # the start is as it is
+    for i, axis in enumerate("xyz"):  # the start is as it is
         low, high = ones * robot.reach_lower[:, i], ones * robot.reach_upper[:, i]
-        program.add("reach", lever[i][1:] >= low, lever[i][1:] <= high)
-    program.add("speed", v[0] <= limits.speed[0], v[0] >= -limits.speed[1])
-    program.add("speed", *(side for i in (1, 2) for side in within(v[i], limits.lateral_speed)))
-    program.add("speed", *(side for angle in theta for side in within(angle, limits.angle)))
+        program.add(f"reach {axis}", lever[i][1:] >= low, lever[i][1:] <= high)
+    program.add("speed forward", v[0] <= limits.speed[0])
+    program.add("speed backward", v[0] >= -limits.speed[1])
+    for i, name in ((1, "sideways"), (2, "vertical")):
+        program.add(f"speed {name}", *within(v[i], limits.lateral_speed))
+    program.add("tilt", *(side for angle in theta for side in within(angle, limits.angle)))
 
     state = problem.start_state
     program.add("start", *(p[i][0] == state.contacts[:, i] for i in range(3)))
@@ -175,16 +196,23 @@ def common(
     ):
         program.add("start", *(vector[i][0] == value[i] for i in range(3)))
     if problem.stance_between_swings and state.swung.any():
-        program.add("modes", S[np.flatnonzero(state.swung), 0] == 0)
+        program.add("pause", program.S[np.flatnonzero(state.swung), 0] == 0)
     if problem.final_stance:
-        program.add("end", *(z[K] == 0 for z in (*v, *omega)), S[:, -1] == 0)
+        program.add("end rest", *(z[K] == 0 for z in (*v, *omega)))
+        program.add("end stand", program.S[:, -1] == 0)
         nominal = robot.stance
-        for i in (0, 1):
-            program.add("end", *within(lever[i][K] - nominal[:, i], limits.rest_offset[i]))
-    program.cost = motion_cost(program) + problem.weights.bounds * sum(
-        cp.sum(U) for U in (*total[0], *total[1])
-    )
-    return program
+        for i, axis in enumerate("xy"):
+            program.add(f"end {axis}", *within(lever[i][K] - nominal[:, i], limits.rest_offset[i]))
+    if problem.goal_tolerance is not None:
+        for i, axis in enumerate("xy"):
+            program.add(f"goal {axis}", *within(x[i][K] - problem.goal[i], problem.goal_tolerance[i]))
+
+
+def levers(program: Program) -> list[Any]:
+    """Return ``p − x`` at the knots, components ``(K+1, L)``."""
+    shape = program.x[0].shape[0], 1
+    ones = np.ones((1, program.problem.legs))
+    return [p - cp.reshape(x, shape, order="C") @ ones for p, x in zip(program.p, program.x, strict=True)]
 
 
 def within(expression: Any, limit: Any) -> list[Any]:

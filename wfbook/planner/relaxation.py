@@ -72,6 +72,9 @@ def build(problem: Problem, bounds: MotionBounds) -> Relaxation:
     constraints += [v[0] <= limits.speed[0], v[0] >= -limits.speed[1]]
     if problem.final_stance:
         constraints += [v[i][K] == 0 for i in range(3)] + [S[:, -1] == 0]
+    if problem.goal_tolerance is not None:
+        for i in (0, 1):
+            constraints += within(x[i][K] - problem.goal[i], problem.goal_tolerance[i])
     cost += w.goal * sum(cp.square(x[i][K] - problem.goal[i]) for i in range(2))
     cost += w.acceleration * sum(cp.sum_squares(a[i]) for i in range(3))
 

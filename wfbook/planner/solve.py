@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from wfbook.planner import bigm
-from wfbook.planner.explain import InfeasibleError, NoPlanError, conflicting_groups
+from wfbook.planner.explain import InfeasibleError, NoPlanError, check_start, why_not
 from wfbook.planner.extract import fill, gait_of, plan_of, read
 from wfbook.planner.gait import Gait
 from wfbook.planner.kernel import Kernel
@@ -81,6 +81,7 @@ def solve_executable(
         Others as for :func:`solve`.
     """
     check_limits(gap, time_limit)
+    check_start(problem)
     polisher = Polisher(problem)
     if formulation == "paper":
         relaxed = solve(problem, formulation, gap, time_limit)
@@ -142,8 +143,7 @@ class Search:
             gaits: to be priced first, whatever the time limit.
             explain: say why, should there be no plan; that can take longer than to find it out.
         """
-        if not problem.start_in_reach:
-            raise InfeasibleError(conflicting_groups(problem))
+        check_start(problem)
         begin = time.perf_counter()
         self.problem, self.gap, self.progress, self.gaits = problem, gap, progress, gaits
         self.explain = explain
@@ -171,8 +171,8 @@ class Search:
         self._left = max(self._left - tree.elapsed, 1e-3)
         self._spent, self._nodes = self._spent + tree.elapsed, self._nodes + nodes
         if status == "infeasible":
-            groups = conflicting_groups(self.problem) if self.explain else ()
-            raise InfeasibleError(groups, len(kernel.excluded))
+            rejected = len(kernel.excluded)
+            raise why_not(self.problem, rejected) if self.explain else InfeasibleError((), rejected)
         if tree.best is None:
             if status == "interrupted":
                 raise KeyboardInterrupt

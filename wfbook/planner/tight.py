@@ -45,7 +45,7 @@ def build(problem: Problem) -> Program:
     program = common(problem, contacts.S, contacts.wheel, force, friction, per_leg=False)
     program.add("friction", *rows)
     program.add("modes", *contacts.rows)
-    program.discrete = contacts.discrete()
+    program.discrete, program.contacts = contacts.discrete(), contacts
     _motion(program, contacts, grid)
     _regions(program, contacts, places)
     _heights(program, contacts, grid, places)
@@ -99,7 +99,7 @@ def region_shares(contacts: Contacts, places: Places) -> tuple[dict[int, dict[in
         occupied, open_ = contacts.occupancy(r), places.reachable[r].astype(float)
         if not open_.all():
             rows.append(occupied <= open_)
-        share = shares[r] = {i: cp.Variable(occupied.shape) for i in places.axes}
+        share = shares[r] = {i: cp.Variable(occupied.shape, name=f"share{r}_{i}") for i in places.axes}
         for i, part in share.items():
             rows.append(part >= cp.multiply(open_ * places.within[r, i], occupied))
             rows.append(part <= cp.multiply(open_ * places.upto[r, i], occupied))

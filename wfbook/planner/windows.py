@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from wfbook.modes import END_EFFECTORS
-from wfbook.planner.explain import InfeasibleError, NoPlanError
+from wfbook.planner.explain import InfeasibleError, NoPlanError, check_start
 from wfbook.planner.extract import gait_of
 from wfbook.planner.gait import Gait
 from wfbook.planner.plan import Plan
@@ -69,6 +69,7 @@ def solve_windows(
     if commit >= window:
         raise ValueError(f"commit: {commit} is not less than the window's {window} slots")
     check_limits(gap, time_limit)
+    check_start(problem)
     begin = time.perf_counter()
     if problem.slots <= window:
         plans = solve_executable(problem, gap=gap, time_limit=time_limit, progress=progress)
@@ -165,6 +166,7 @@ class _Windows:
         else:
             goal, rest = intermediate_goal(problem, state, size), True
         changes = {"slots": size, "goal": goal, "final_stance": rest, "beyond_reach": True}
+        changes["goal_tolerance"] = problem.goal_tolerance if last else None
         if self.gait is None:
             return replace(problem, **changes)
         return problem.begun(state, kinds, **changes)
