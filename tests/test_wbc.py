@@ -78,7 +78,7 @@ def test_the_answer_obeys_the_physics(robot, ground, mode, seed):
     assert np.all(n[ref.stance] >= least - 1e-3)
     mu_b = np.where(ref.wheels, ground.mu_wheel_lateral, ground.mu_foot)
     assert np.all(np.abs(b) <= mu_b * n + 1e-3)
-    assert np.all(np.abs(t[~ref.wheels]) <= (ground.mu_foot * n)[~ref.wheels] + 1e-3)
+    assert np.all(np.hypot(t, b)[~ref.wheels] <= (ground.mu_foot * n)[~ref.wheels] + 1e-3)
     rolling = ref.wheels & ref.stance
     resisting = -ground.rolling_resistance * n * np.tanh(contact.velocity[:, 0] / 0.02)
     np.testing.assert_allclose(t[rolling], resisting[rolling], atol=1e-3)
@@ -109,7 +109,7 @@ def test_osqp_and_an_exact_solver_agree_in_closed_loop(monkeypatch):
         P_pattern, A_pattern = wbc._pattern()
         exact = QuadraticProgram(P_pattern, A_pattern, "daqp")
         for program, u in seen[::3]:
-            errors.append(np.abs(program[2][38:] @ (u - solve(exact, *program))).max())
+            errors.append(np.abs(program[2][-12:] @ (u - solve(exact, *program))).max())
     assert np.percentile(errors, 99) <= 0.02
     assert len(errors) > 400
 

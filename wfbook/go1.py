@@ -4,12 +4,14 @@ Both end effectors sit on the calf's end, concentric. Only one of them collides 
 mechanism switches "nearly instantly during the swing phase", and so does :meth:`Go1.set_end_effector`.
 """
 
+import itertools
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
+from scipy.spatial import ConvexHull
 
 from wfbook.modes import END_EFFECTORS, LEGS
 
@@ -33,6 +35,7 @@ _SIDES = np.array([[1.0, 1.0, 1.0], [1.0, -1.0, 1.0], [-1.0, 1.0, 1.0], [-1.0, -
 _YZX, _ZXY = np.array([1, 2, 0]), np.array([2, 0, 1])
 _THICKNESS = 0.5
 _LOADED = 1.0
+_SEAM = 1e-4
 
 
 class LoadedLegError(ValueError):
@@ -111,8 +114,9 @@ def leg_kinematics(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarr
 class Go1:
     """A Go1 on a terrain: MuJoCo's model and data, and what a controller and a log need of them.
 
-    The terrain brings friction and rolling resistance. Each region becomes two geoms of the same shape,
-    one for feet and hulls, one for wheels, because one MuJoCo geom has one friction for all it meets.
+    The terrain brings friction and rolling resistance. Each convex body of regions becomes two geoms of the
+    same shape, one for feet and hulls, one for wheels, because one MuJoCo geom has one friction for all it
+    meets.
 
     Args:
         terrain: to stand on.
@@ -129,8 +133,8 @@ class Go1:
         self, terrain: "Terrain", joint_friction: float = 0.0, trunk_mass_scale: float = 1.0
     ) -> None:
         spec = mujoco.MjSpec.from_file(str(ASSETS / "go1.xml"))
-        for index, region in enumerate(terrain.regions):
-            _add_region(spec, index, region)
+        for index, body in enumerate(convex_bodies(terrain)):
+            _add_body(spec, [terrain.regions[i] for i in body], index)
         self.terrain = terrain
         self.model = model = spec.compile()
         self.data = mujoco.MjData(model)
@@ -239,18 +243,52 @@ class Go1:
         )
 
 
-def _add_region(spec: mujoco.MjSpec, index: int, region: "Region") -> None:
-    """Add a region to a model as the top of an upright prism, once for feet and once for wheels."""
-    top = region.vertices - region.vertices.mean(axis=0)
+def convex_bodies(terrain: "Terrain") -> list[list[int]]:
+    """Return the indices of the regions that make one convex body each, so that it has no seams.
+
+    Where two geoms meet, a wheel that sinks half a millimetre into one runs against the edge of the other
+    and is slowed. Over a crest, regions of the same friction are one convex body, and the crest is its edge.
+    In a hollow they can't be, and need not: there a wheel leaves the one as it touches the other.
+    """
+    bodies = [[i] for i in range(len(terrain.regions))]
+    joined = True
+    while joined:
+        joined = False
+        for a, b in itertools.combinations(bodies, 2):
+            if _convex(terrain, a, b):
+                a += b
+                bodies.remove(b)
+                joined = True
+                break
+    return bodies
+
+
+def _convex(terrain: "Terrain", a: list[int], b: list[int]) -> bool:
+    """Whether the union of two sets of regions is the upper side of a convex body of one friction."""
+    regions = [terrain.regions[i] for i in a + b]
+    if len({(r.mu_foot, r.mu_wheel_lateral, r.rolling_resistance) for r in regions}) > 1:
+        return False
+    corners = np.vstack([r.vertices for r in regions])
+    above = max(((corners - r.vertices[0]) @ r.normal).max() for r in regions)
+    # In two dimensions scipy calls the area volume.
+    areas = [ConvexHull(r.vertices[:, :2]).volume for r in regions]
+    return above < _SEAM and abs(ConvexHull(corners[:, :2]).volume - sum(areas)) < _SEAM * sum(areas)
+
+
+def _add_body(spec: mujoco.MjSpec, regions: "list[Region]", index: int) -> None:
+    """Add regions to a model as the top of one convex body, once for feet and once for wheels."""
+    corners = np.vstack([region.vertices for region in regions])
+    centre, region = corners.mean(axis=0), regions[0]
+    top = corners - centre
     prism = np.vstack([top, top - [0.0, 0.0, _THICKNESS]])
-    spec.add_mesh(name=f"region_{index}", uservert=prism.ravel())
+    spec.add_mesh(name=f"ground_{index}", uservert=prism.ravel())
     for kind, bit, mu in (("foot", 1, region.mu_foot), ("wheel", 2, region.mu_wheel_lateral)):
         rolling = region.rolling_resistance * WHEEL_RADIUS if kind == "wheel" else 0.0
         spec.worldbody.add_geom(
-            name=f"region_{index}_{kind}",
+            name=f"ground_{index}_{kind}",
             type=mujoco.mjtGeom.mjGEOM_MESH,
-            meshname=f"region_{index}",
-            pos=region.vertices.mean(axis=0),
+            meshname=f"ground_{index}",
+            pos=centre,
             contype=0,
             conaffinity=bit,
             condim=6 if rolling > 0 else 3,

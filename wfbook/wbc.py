@@ -26,6 +26,14 @@ from wfbook.reference import Gains, Ground, Reference
 LEG_COLUMNS = 6 + np.arange(12).reshape(4, 3)
 """Where the joints of each leg stand in the 18 accelerations."""
 
+_DIRECTIONS = np.array([(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)], float)
+_SIDES = len(_DIRECTIONS)
+FRICTION_ROWS = _SIDES + 1
+"""Sides of a foot's friction pyramid, and the one that says that it pushes."""
+
+_FRICTION = 18 + np.arange(4 * FRICTION_ROWS).reshape(4, FRICTION_ROWS)
+_TORQUES = slice(18 + 4 * FRICTION_ROWS, 30 + 4 * FRICTION_ROWS)
+_ROWS = _TORQUES.stop
 _FREE = np.inf
 
 
@@ -142,18 +150,24 @@ def fixed_wheels(contact: Contacts, damping: float) -> np.ndarray:
 
 
 def friction_pyramids(ground: Ground, contact: Contacts, wheels: np.ndarray) -> np.ndarray:
-    """Return ``P`` of each leg, ``(4, 5, 3)`` along t, b, n, so that ``P λ ≤ 0`` (Paper A, eqs 26 and 42).
+    """Return ``P`` of each leg, ``(4, 9, 3)`` along t, b, n, so that ``P λ ≤ 0`` (Paper A, eqs 26 and 42).
+
+    The paper's four sides hold ``t`` and ``b`` apart: together they allow a foot 1.4 times the force at
+    which it slides. Here a foot has eight, all inside the cone.
 
     A free wheel has no traction to choose: along t it feels rolling resistance alone (eq. 29), against
     its motion, so its pyramid is flat there.
     """
     resistance = ground.rolling_resistance * np.tanh(contact.velocity[:, 0] / 0.02)
-    ahead = np.where(wheels, -resistance, ground.mu_foot)  # the largest λ_t / λ_n
-    behind = np.where(wheels, resistance, ground.mu_foot)  # the largest −λ_t / λ_n
-    aside = np.where(wheels, ground.mu_wheel_lateral, ground.mu_foot)
-    P = np.zeros((4, 5, 3))
-    P[:, 0, 0], P[:, 1, 0], P[:, 2, 1], P[:, 3, 1], P[:, 4, 2] = 1.0, -1.0, 1.0, -1.0, -1.0
-    P[:, :4, 2] = -np.stack([ahead, behind, aside, aside], axis=1)
+    grip = np.cos(np.pi / _SIDES) * ground.mu_foot
+    ahead = np.where(wheels, -resistance, grip)  # the largest λ_t / λ_n
+    behind = np.where(wheels, resistance, grip)  # the largest −λ_t / λ_n
+    aside = np.where(wheels, ground.mu_wheel_lateral, grip)
+    corner = np.where(wheels, aside + np.abs(resistance), np.sqrt(2.0) * grip)
+    P = np.zeros((4, FRICTION_ROWS, 3))
+    P[:, :_SIDES, :2] = _DIRECTIONS
+    P[:, :_SIDES, 2] = -np.stack([ahead, behind, aside, aside, corner, corner, corner, corner], axis=1)
+    P[:, _SIDES, 2] = -1.0
     return P
 
 
@@ -244,7 +258,7 @@ class WholeBodyController:
         """Return the program of Paper A, eqs 38–43, at the robot's state.
 
         Returns:
-            P ``(30, 30)``, q ``(30,)``, A ``(50, 30)``, l and c ``(50,)`` of ``min ½ uᵀP u + qᵀu`` subject to
+            P ``(30, 30)``, q ``(30,)``, A ``(66, 30)``, l and c ``(66,)`` of ``min ½ uᵀP u + qᵀu`` subject to
             ``l ≤ A u ≤ c``, and the contacts.
         """
         robot, gains = self.robot, self.gains
@@ -257,7 +271,7 @@ class WholeBodyController:
         P[np.arange(30), np.arange(30)] += [gains.acceleration_weight] * 18 + [gains.force_weight] * 12
         q[18:] = -gains.force_weight * np.einsum("lij,lj->li", contact.basis, ref.forces).ravel()
 
-        A, lower, upper = np.zeros((50, 30)), np.full(50, -_FREE), np.full(50, _FREE)
+        A, lower, upper = np.zeros((_ROWS, 30)), np.full(_ROWS, -_FREE), np.full(_ROWS, _FREE)
         E, h = equations_of_motion(robot, contact)
         A[:6], lower[:6], upper[:6] = E[:6], -h[:6], -h[:6]
 
@@ -274,13 +288,13 @@ class WholeBodyController:
 
         pyramids = friction_pyramids(ground, contact, ref.wheels)
         for leg in range(4):
-            A[18 + 5 * leg : 23 + 5 * leg, 18 + 3 * leg : 21 + 3 * leg] = pyramids[leg]
-        upper[18:38] = 0.0
-        upper[22:38:5] = np.where(ref.stance, -gains.least_force, 0.0)
-        lower[22:38:5] = np.where(ref.stance, -_FREE, 0.0)  # a leg in the air presses on nothing
+            A[_FRICTION[leg], 18 + 3 * leg : 21 + 3 * leg] = pyramids[leg]
+        upper[_FRICTION] = 0.0
+        upper[_FRICTION[:, -1]] = np.where(ref.stance, -gains.least_force, 0.0)
+        lower[_FRICTION[:, -1]] = np.where(ref.stance, -_FREE, 0.0)  # a leg in the air presses on nothing
 
-        A[38:] = E[6:]
-        lower[38:], upper[38:] = -robot.effort - h[6:], robot.effort - h[6:]
+        A[_TORQUES] = E[6:]
+        lower[_TORQUES], upper[_TORQUES] = -robot.effort - h[6:], robot.effort - h[6:]
         return P, q, A, lower, upper, contact
 
     def tick(self, ref: Reference, ground: Ground) -> Command:
@@ -289,7 +303,7 @@ class WholeBodyController:
         u = self._program.solve(*program)
         if u is None:
             return self._without_solution()
-        torques = program[2][38:] @ u + self.robot.h[6:]
+        torques = program[2][_TORQUES] @ u + self.robot.h[6:]
         torques = np.clip(torques, -self.robot.effort, self.robot.effort)
         forces = np.einsum("lij,li->lj", contact.basis, u[18:].reshape(4, 3))
         self._misses = 0
@@ -306,8 +320,8 @@ class WholeBodyController:
 
 
 def _pattern() -> tuple[np.ndarray, np.ndarray]:
-    """Return where P and A can be non-zero, whatever the mode: ``(30, 30)`` and ``(50, 30)`` bool."""
-    P, A = np.zeros((30, 30), bool), np.zeros((50, 30), bool)
+    """Return where P and A can be non-zero, whatever the mode: ``(30, 30)`` and ``(66, 30)`` bool."""
+    P, A = np.zeros((30, 30), bool), np.zeros((_ROWS, 30), bool)
     P[:18, :18] = True
     P[np.arange(30), np.arange(30)] = True
     A[:6] = True
@@ -316,10 +330,9 @@ def _pattern() -> tuple[np.ndarray, np.ndarray]:
         force = np.arange(18 + 3 * leg, 21 + 3 * leg)
         for axis in range(3):
             A[6 + 3 * leg + axis, own] = True
-            A[38 + 3 * leg + axis, np.r_[own, force]] = True
-        rows = 18 + 5 * leg + np.arange(5)
-        A[rows, force[[0, 0, 1, 1, 2]]] = True
-        A[rows[:4], force[2]] = True
+            A[_TORQUES.start + 3 * leg + axis, np.r_[own, force]] = True
+        A[_FRICTION[leg][:_SIDES, None], force[:2]] = _DIRECTIONS != 0.0
+        A[_FRICTION[leg], force[2]] = True
     return P, A
 
 

@@ -4,7 +4,7 @@ The relaxation of eq. 9 lets the program buy torque that no contact makes, and i
 from it fall. With the binaries fixed, the only non-convexity left is the product of lever and force.
 It is linearised about the last plan, inside a trust region; a few small QPs bring the true torque of
 eq. 8 into agreement with the rotation. What comes out adds the sideways sway that the relaxed plan
-did without, and keeps footholds off the edges of their regions.
+did without, and keeps its distance from edges and from the limits of friction (:mod:`.margins`).
 """
 
 from dataclasses import replace
@@ -18,9 +18,9 @@ from wfbook.planner import tight
 from wfbook.planner.conic import Conic
 from wfbook.planner.contacts import assignment
 from wfbook.planner.crossings import Crossings, settle
-from wfbook.planner.edges import kept_off
 from wfbook.planner.extract import fill, gait_of, plan_of, problem_of, read
 from wfbook.planner.gait import Gait
+from wfbook.planner.margins import kept_in_grip, kept_off
 from wfbook.planner.plan import Plan
 from wfbook.planner.presolve import solve_fixed
 from wfbook.planner.problem import Problem
@@ -37,6 +37,9 @@ It must exceed what such torque earns anywhere, or a goal farther than the gait 
 
 EDGE_PRICE = 20.0
 """Of a metre that a contact is too near to an edge, besides what it could earn at the goal."""
+
+GRIP_PRICE = 3.0
+"""Of a body weight of force outside of the smaller pyramid, for each leg and interval."""
 
 TOLERANCE_NM = 1e-3
 """The largest true torque mismatch at which the iteration ends."""
@@ -66,7 +69,9 @@ class Polisher:
         self._short = cp.Variable((problem.legs, problem.slots))
         away = float(np.linalg.norm(np.subtract(problem.goal, problem.start)))
         cost += (EDGE_PRICE + 2 * problem.weights.goal * away) * cp.sum(self._short)
-        ties.append(self._short >= 0)
+        self._slip = cp.Variable(shape)
+        cost += GRIP_PRICE * cp.sum(self._slip)
+        ties += [self._short >= 0, self._slip >= 0]
         self._conic = Conic.compile(cost, program.rows(without=("torque", "torque bounds")) + ties)
         self._program_columns = {key: self._conic.columns(v) for key, v in program.discrete.items()}
 
@@ -83,13 +88,13 @@ class Polisher:
         weight, conic = self.problem.robot.weight, self._conic
         gait = gait_of(plan)
         columns, fixed = self._binaries(gait, plan.p)
-        off_edges = self._off_edges(gait)
+        margins = self._margins(gait)
         lever, force = _middle_levers(plan), [plan.lam[..., i] / weight for i in range(3)]
         radius, best, merit, steps = np.array([0.05, 0.25]), None, np.inf, 0
         cost = np.inf
         while steps < _ITERATIONS:
             steps += 1
-            found = solve_fixed(self._linearised(lever, force, radius, off_edges), columns, fixed)
+            found = solve_fixed(self._linearised(lever, force, radius, margins), columns, fixed)
             if found.status != "solved":
                 # The relaxed plan may lie outside the polish's rows by a solver's tolerance.
                 if best is not None or radius[0] > 0.4:
@@ -141,26 +146,35 @@ class Polisher:
                 settled = np.rint(found.y[columns])
         return columns, settled
 
-    def _off_edges(self, gait: Gait) -> tuple[sparse.csc_matrix, np.ndarray]:
-        """Return rows and right-hand sides that keep contacts off edges, as far as ``_short`` allows."""
+    def _margins(self, gait: Gait) -> tuple[sparse.csc_matrix, np.ndarray]:
+        """Return rows and right-hand sides of the margins, as far as ``_short`` and ``_slip`` allow them."""
         problem, conic = self.problem, self._conic
-        edges = list(kept_off(problem, gait))
-        p = [conic.columns(c).reshape(problem.knots + 1, problem.legs) for c in self.program.p[:2]]
-        short = conic.columns(self._short).reshape(problem.legs, problem.slots)
-        rows = sparse.lil_matrix((len(edges), conic.A.shape[1]))
-        for row, (leg, slot, a, _) in enumerate(edges):
+        p = np.stack([conic.columns(c) for c in self.program.p[:2]])
+        force = np.stack([conic.columns(v) for v in self._force])
+        short, slip = conic.columns(self._short), conic.columns(self._slip)
+        columns, entries, right = [], [], []
+        for leg, slot, a, b in kept_off(problem, gait):
             knot = problem.knots_per_slot * (slot + 1)
-            rows[row, [p[0][knot, leg], p[1][knot, leg], short[leg, slot]]] = [*a, -1.0]
-        return rows.tocsc(), np.array([edge.b for edge in edges])
+            columns.append([*p[:, knot, leg], short[leg, slot]])
+            entries.append([*a, -1.0])
+            right.append(b)
+        for k, leg, c in kept_in_grip(problem, gait):
+            columns.append([*force[:, k, leg], slip[k, leg]])
+            entries.append([*c, -1.0])
+            right.append(0.0)
+        rows = np.repeat(np.arange(len(columns)), [len(c) for c in columns])
+        shape = len(columns), conic.A.shape[1]
+        where = rows, np.concatenate(columns)
+        return sparse.csc_matrix((np.concatenate(entries), where), shape=shape), np.array(right)
 
     def _linearised(
         self,
         lever: list[np.ndarray],
         force: list[np.ndarray],
         radius: np.ndarray,
-        off_edges: tuple[sparse.csc_matrix, np.ndarray],
+        margins: tuple[sparse.csc_matrix, np.ndarray],
     ) -> Conic:
-        """Return the QP with eq. 8 linearised about a plan, inside a trust region, contacts off edges."""
+        """Return the QP with eq. 8 linearised about a plan, inside a trust region and with margins."""
         conic, problem = self._conic, self.problem
         n, K = conic.A.shape[1], problem.knots
         inertia = problem.robot.inertia / problem.robot.weight
@@ -195,8 +209,8 @@ class Polisher:
         centre = np.concatenate([c.ravel() for c in (*lever, *force)])
         size = np.repeat(radius, len(boxed) // 2)
         pick = sparse.csc_matrix((np.ones(len(boxed)), (np.arange(len(boxed)), boxed)), shape=(len(boxed), n))
-        below = sparse.vstack([pick, -pick, off_edges[0]])
-        limit = np.concatenate([centre + size, size - centre, off_edges[1]])
+        below = sparse.vstack([pick, -pick, margins[0]])
+        limit = np.concatenate([centre + size, size - centre, margins[1]])
         return conic.with_rows(equal, np.concatenate(right), below, limit)
 
     def _mismatch(self, lever: list[np.ndarray], force: list[np.ndarray], y: np.ndarray) -> np.ndarray:

@@ -1,9 +1,12 @@
-"""How far contacts keep from the edges of their regions.
+"""How far a plan that is to be executed keeps from its limits.
 
-A plan may put a foothold on the very edge of a stone, which is inside it (eq. 22). A robot may not: its foot
-rolls forward by a centimetre while it stands, and lands where the controller can put it. The same holds
-for a wheel at an edge beyond which its group does not go on. Beside a step up there must be room for the foot
-itself, and for the calf above it.
+**Edges.** A plan may put a foothold on the very edge of a stone, which is inside it (eq. 22). A robot may
+not: its foot rolls forward by a centimetre while it stands, and lands where the controller can put it. The
+same holds for a wheel at an edge beyond which its group does not go on. Beside a step up there must be room
+for the foot itself, and for the calf above it.
+
+**Grip.** A plan may use all friction there is (eqs 26 and 27), and in the corners of the pyramid more. Then
+nothing is left to correct an error with, and the foot slides.
 """
 
 from collections.abc import Iterator
@@ -19,6 +22,9 @@ MARGIN = 0.015
 
 STEP_MARGIN = 0.04
 """How far from a step up to a neighbour."""
+
+GRIP = 0.65
+"""Share of the friction coefficients that forces keep to; the corners of this pyramid are in the cone."""
 
 _BEYOND = 2e-3
 _STEP = 5e-3
@@ -49,6 +55,23 @@ def kept_off(problem: Problem, gait: Gait) -> Iterator[Edge]:
             if not (wheel and _goes_on(problem, region, i)):
                 margin = STEP_MARGIN if _rises(problem, region, i) else MARGIN
                 yield Edge(int(leg), int(slot), a, float(b) - margin)
+
+
+def kept_in_grip(problem: Problem, gait: Gait) -> Iterator[tuple[int, int, np.ndarray]]:
+    """Yield the sides of smaller friction pyramids: intervals' indices, leg, and ``c`` with ``c · λ ≤ 0``.
+
+    A wheel that rolls over an edge within a slot is taken to be on the region on which it ends.
+    """
+    for leg, slot in np.argwhere(gait.S == 0):
+        region = problem.terrain.regions[int(gait.region[leg, slot])]
+        if gait.wheel[leg, slot]:
+            sides = [(region.binormal, region.mu_wheel_lateral)]
+        else:
+            sides = [(region.tangent, region.mu_foot), (region.binormal, region.mu_foot)]
+        for direction, mu in sides:
+            for sign in (1.0, -1.0):
+                for k in range(problem.knots_per_slot * slot, problem.knots_per_slot * (slot + 1)):
+                    yield k, int(leg), sign * direction - GRIP * mu * region.normal
 
 
 def _goes_on(problem: Problem, region: int, edge: int) -> bool:
