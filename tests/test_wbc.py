@@ -80,7 +80,7 @@ def test_the_answer_obeys_the_physics(robot, ground, mode, seed):
     assert np.all(np.abs(b) <= mu_b * n + 1e-3)
     assert np.all(np.hypot(t, b)[~ref.wheels] <= (ground.mu_foot * n)[~ref.wheels] + 1e-3)
     rolling = ref.wheels & ref.stance
-    resisting = -ground.rolling_resistance * n * np.tanh(contact.velocity[:, 0] / 0.02)
+    resisting = -ground.rolling_resistance * n * np.tanh(contact.velocity[:, 0] / wbc.ROLLING_SPEED)
     np.testing.assert_allclose(t[rolling], resisting[rolling], atol=1e-3)
 
     damped = np.einsum("lij,lj->li", contact.basis, jacobian @ command.acceleration + drift)

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 _WELL_INSIDE = 0.06
 """Farther than this from every edge, a foot or wheel touches no other region."""
 
+_TOUCHING = 0.0015
+"""By how much farther another face may be that is touched too."""
+
 _STEEPEST = np.cos(np.radians(60.0))
 
 
@@ -55,12 +58,13 @@ class Footing:
         self.landed[leg] = self.regions[leg] = region
         self.normals[leg] = self.terrain.regions[region].normal
 
-    def stand(self, leg: int, centre: np.ndarray) -> None:
+    def stand(self, leg: int, centre: np.ndarray, ahead: float = 0.0) -> None:
         """Look at what is under a standing leg: its region, or one that continues it (Paper A, eq. 23).
 
         Args:
             leg: index.
             centre: ``(3,)`` of its foot or wheel.
+            ahead: velocity along x with which a wheel is to roll.
         """
         own = self.terrain.regions[self.regions[leg]]
         if own.outside(centre[0], centre[1]) < -_WELL_INSIDE:
@@ -68,14 +72,21 @@ class Footing:
             return
         # Its own region comes first, and stays in a tie.
         joined = sorted(self._joined[self.regions[leg]], key=lambda i: i != self.regions[leg])
+        faces = [self.terrain.regions[i].normal for i in joined]
         away = np.array([centre - self.terrain.regions[i].nearest(centre) for i in joined])
         distance = np.linalg.norm(away, axis=1)
-        closest = int(np.argmin(np.round(distance, 9)))
-        self.regions[leg] = joined[closest]
-        normal = self.terrain.regions[joined[closest]].normal
-        if away[closest] @ normal > _STEEPEST * distance[closest]:
-            normal = away[closest] / distance[closest]
-        self.normals[leg] = normal
+        chosen = int(np.argmin(np.round(distance, 9)))
+        if ahead:
+            # In a hollow a wheel touches two faces; it will leave the one from which its motion leads away.
+            touched = distance < distance[chosen] + _TOUCHING
+            touched &= np.sum(away * faces, axis=1) > (1.0 - 1e-9) * distance
+            leads_away = np.where(touched, ahead * np.array(faces)[:, 0], np.inf)
+            if touched[chosen]:
+                chosen = int(np.argmin(np.round(leads_away, 9)))
+        self.regions[leg] = joined[chosen]
+        self.normals[leg] = faces[chosen]
+        if away[chosen] @ faces[chosen] > _STEEPEST * distance[chosen]:
+            self.normals[leg] = away[chosen] / distance[chosen]
 
     def astray(self, leg: int, centre: np.ndarray, radius: float, rolls: bool) -> float:
         """Return how far a standing leg's lowest point is beside the regions on which it may be; 0 on them.

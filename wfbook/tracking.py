@@ -46,6 +46,7 @@ _COMMITTED = 0.9
 _FARTHEST_ASIDE = 0.06
 _SWITCH_ROOM = 0.004
 _OFF_EDGES = 0.005
+_CATCH_UP = 5.0
 
 
 @dataclass(frozen=True)
@@ -164,8 +165,10 @@ class Tracker:
             self._advance(leg, t, bool(touching[leg]), ends[leg], robot.centre_velocity[leg])
         p = np.zeros((4, 3))
         for leg in np.flatnonzero(self.stance):
-            self.footing.stand(leg, ends[leg])
-            p[leg] = self._standing(leg, t, com) + RADII[self._kinds[leg]] * self.footing.normals[leg]
+            p[leg] = self._standing(leg, t, com)
+            late = p[leg, 0] - ends[leg, 0] + RADII[self._kinds[leg]] * self.footing.normals[leg, 0]
+            self.footing.stand(leg, ends[leg], self._kinds[leg] * (velocity[0] + _CATCH_UP * late))
+            p[leg] += RADII[self._kinds[leg]] * self.footing.normals[leg]
         ground = self.footing.ground()
         v, a = np.where(self._kinds[:, None] == 1, velocity, 0.0), np.zeros((4, 3))
         self._step_aside(t, robot, com, velocity)
@@ -274,7 +277,8 @@ class Tracker:
             com, com_velocity, _ = interpolate(self.plan, flight.start + flight.duration)
             along = region.tangent / region.tangent[0]
             landing = com_velocity[0] * along
-            target = target - (interpolate(self.plan, flight.end)[0][0] - com[0]) * along
+            back = (com[0] - interpolate(self.plan, flight.end)[0][0]) * along
+            target = target + _room(region, target, back[:2]) * back
         else:
             roll = self._roll(leg, flight) * region.tangent
             target = target - (1.0 - _room(region, target, roll[:2])) * roll

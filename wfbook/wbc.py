@@ -31,6 +31,10 @@ _SIDES = len(_DIRECTIONS)
 FRICTION_ROWS = _SIDES + 1
 """Sides of a foot's friction pyramid, and the one that says that it pushes."""
 
+ROLLING_SPEED = 0.1
+"""Above which a wheel is taken to roll against all its resistance. What the program expects of the resistance
+it makes up for: of a sudden change at rest it makes negative damping, and the wheel swings to and fro."""
+
 _FRICTION = 18 + np.arange(4 * FRICTION_ROWS).reshape(4, FRICTION_ROWS)
 _TORQUES = slice(18 + 4 * FRICTION_ROWS, 30 + 4 * FRICTION_ROWS)
 _ROWS = _TORQUES.stop
@@ -158,7 +162,7 @@ def friction_pyramids(ground: Ground, contact: Contacts, wheels: np.ndarray) -> 
     A free wheel has no traction to choose: along t it feels rolling resistance alone (eq. 29), against
     its motion, so its pyramid is flat there.
     """
-    resistance = ground.rolling_resistance * np.tanh(contact.velocity[:, 0] / 0.02)
+    resistance = ground.rolling_resistance * np.tanh(contact.velocity[:, 0] / ROLLING_SPEED)
     grip = np.cos(np.pi / _SIDES) * ground.mu_foot
     ahead = np.where(wheels, -resistance, grip)  # the largest λ_t / λ_n
     behind = np.where(wheels, resistance, grip)  # the largest −λ_t / λ_n

@@ -3,7 +3,7 @@
 **Edges.** A plan may put a foothold on the very edge of a stone, which is inside it (eq. 22). A robot may
 not: its foot rolls forward by a centimetre while it stands, and lands where the controller can put it. The
 same holds for a wheel at an edge beyond which its group does not go on. Beside a step up there must be room
-for the foot itself, and for the calf above it.
+for the foot itself, and in front of one for the calf, which slants back.
 
 **Grip.** A plan may use all friction there is (eqs 26 and 27), and in the corners of the pyramid more. Then
 nothing is left to correct an error with, and the foot slides.
@@ -20,8 +20,11 @@ from wfbook.planner.problem import Problem
 MARGIN = 0.015
 """How far inside, where there is room."""
 
-STEP_MARGIN = 0.04
+STEP_MARGIN = 0.03
 """How far from a step up to a neighbour."""
+
+CALF = 2.0
+"""How much farther from one behind, over the step's height."""
 
 GRIP = 0.65
 """Share of the friction coefficients that forces keep to; the corners of this pyramid are in the cone."""
@@ -53,8 +56,7 @@ def kept_off(problem: Problem, gait: Gait) -> Iterator[Edge]:
         region, wheel = int(gait.region[leg, slot]), bool(gait.wheel[leg, slot])
         for i, (a, b) in enumerate(zip(*problem.terrain.regions[region].halfspaces, strict=True)):
             if not (wheel and _goes_on(problem, region, i)):
-                margin = STEP_MARGIN if _rises(problem, region, i) else MARGIN
-                yield Edge(int(leg), int(slot), a, float(b) - margin)
+                yield Edge(int(leg), int(slot), a, float(b) - _margin(problem, region, i, a))
 
 
 def kept_in_grip(problem: Problem, gait: Gait) -> Iterator[tuple[int, int, np.ndarray]]:
@@ -81,14 +83,17 @@ def _goes_on(problem: Problem, region: int, edge: int) -> bool:
     return any(regions[other].contains(x, y) for other in group if other != region)
 
 
-def _rises(problem: Problem, region: int, edge: int) -> bool:
-    """Whether the ground is higher anywhere beyond an edge."""
+def _margin(problem: Problem, region: int, edge: int, outward: np.ndarray) -> float:
+    """Return how far from an edge a contact should be, by the highest ground just beyond the edge."""
+    terrain, rise = problem.terrain, 0.0
     for share in _ALONG:
         x, y = _beyond(problem, region, edge, share)
-        height = problem.terrain.height(x, y)
-        if height is not None and height > problem.terrain.regions[region].height(x, y) + _STEP:
-            return True
-    return False
+        height = terrain.height(x, y)
+        if height is not None:
+            rise = max(rise, height - terrain.regions[region].height(x, y))
+    if rise < _STEP:
+        return MARGIN
+    return STEP_MARGIN + CALF * rise * max(-outward[0], 0.0)
 
 
 def _beyond(problem: Problem, region: int, edge: int, share: float) -> np.ndarray:
