@@ -385,10 +385,12 @@ def test_progress_is_one_line_on_a_terminal_and_few_lines_elsewhere():
     assert file.getvalue().count("\n") <= 3
 
 
-def test_stones_can_be_asked_for_by_file(capsys, tmp_path):
-    """Several regions are read and checked; planning on them comes later and says so in one line."""
-    stepping_stones().save(tmp_path / "stones.json")
-    assert "stepping-stones" in refused(capsys, tmp_path, "run", "stones.json")
+def test_a_file_of_several_regions_is_planned_and_executed(capsys, tmp_path):
+    stepping_stones(gap=0.05, start=0.25).save(tmp_path / "stones.json")
+    options = ["--slots", "3", "--goal", "0.1", "0", "--feet-only", "--gap", "0.05", "--json"]
+    assert main(["run", "stones.json", *options]) == 0
+    assert json.loads(capsys.readouterr().out)["terrain"] == "stepping-stones"
+    assert {path.name for path in (tmp_path / "runs" / "stepping-stones").iterdir()} == FILES
 
 
 def test_an_infeasible_floor_is_named(capsys, tmp_path):
@@ -401,7 +403,7 @@ def test_an_infeasible_floor_is_named(capsys, tmp_path):
     assert out == ""
     last = err.splitlines()[-1]
     assert last.startswith("wfbook: infeasible")
-    assert "(regions)" in last
+    assert "over no region" in last
     assert everything(tmp_path) == {"ledge.json"}
 
 

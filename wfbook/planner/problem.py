@@ -196,10 +196,18 @@ class Problem:
                 raise ValueError(f"initial: the contact of {LEGS[leg]} is not on the ground")
 
     def _check_goal(self):
-        """Refuse a goal that no plan comes near."""
+        """Refuse a goal that no plan comes near.
+
+        The centre of mass may end over a gap that the legs span, but not farther out.
+        """
+        if self.beyond_reach:
+            return
+        span = np.abs(self.robot.stance).max() + max(self.robot.reach)
+        if min(region.outside(*self.goal) for region in self.terrain.regions) > span:
+            raise ValueError(f"goal: {tuple(self.goal)} lies outside the terrain {self.terrain.name!r}")
         distance = float(np.hypot(*np.subtract(self.goal, self.start)))
         furthest = self.limits.speed[0] * self.duration
-        if distance > furthest and not self.beyond_reach:
+        if distance > furthest:
             raise ValueError(
                 f"goal: {tuple(self.goal)} is out of reach: {distance:.2f} m away, "
                 f"{furthest:.2f} m at {self.limits.speed[0]} m/s in {self.duration:.1f} s"
