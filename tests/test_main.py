@@ -401,7 +401,7 @@ def test_an_infeasible_floor_is_named(capsys, tmp_path):
     assert out == ""
     last = err.splitlines()[-1]
     assert last.startswith("wfbook: infeasible")
-    assert "(regions)" in last
+    assert "leg RL starts at (-0.19, 0.13), over no region" in last
     assert everything(tmp_path) == {"ledge.json"}
 
 

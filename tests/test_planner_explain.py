@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from terrain_cases import random_problem
 
 from wfbook import terrain
 from wfbook.planner import InfeasibleError, Limits, Problem, explain, reasons, solve, solve_executable
@@ -321,6 +322,17 @@ def test_no_group_can_be_left_out(p):
     assert feasible(groups) is False
     for group in groups:
         assert feasible(set(groups) - {group}) is True
+
+
+@pytest.mark.parametrize("seed", [0, 4, 8, 25, 28, 34])
+def test_with_all_limits_the_elastic_program_is_the_problem(seed):
+    rng = np.random.default_rng(seed)
+    p = random_problem(rng, slots=4)
+    goal, near = (rng.uniform(0.3, 0.6), rng.uniform(-0.1, 0.1)), tuple(rng.uniform(0.01, 0.1, 2))
+    p = replace(p, goal=goal, goal_tolerance=near)
+    elastic = explain.Elastic(p, PLENTY, PLENTY)
+    assert elastic.feasible(elastic.parts) is possible(p, PLENTY) is not None
+    assert elastic.feasible([]) is True
 
 
 def test_the_search_raises_the_explanation():
