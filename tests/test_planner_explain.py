@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from terrain_cases import random_problem
 
 from wfbook import terrain
 from wfbook.planner import InfeasibleError, Limits, Problem, explain, reasons, solve, solve_executable
@@ -39,6 +40,12 @@ def region(x0, x1, y0=-1.0, y1=1.0, z=0.0, slope=0.0, group="ground", **surface)
 def ground(*regions: Region) -> Terrain:
     """Return a terrain of regions, each a group of its own."""
     return Terrain("built", tuple(replace(r, group=f"{r.group} {i}") for i, r in enumerate(regions)))
+
+
+def walk(terrain: Terrain, x: float, slots: int, near: float = 0.05, **changes) -> Problem:
+    """Return a problem on feet whose goal must be met."""
+    goal = {"goal": (x, 0.0), "goal_tolerance": (near, near)}
+    return Problem(terrain, slots=slots, end_effectors=FEET, **goal | changes)
 
 
 def offsets(**places) -> np.ndarray:
@@ -118,7 +125,7 @@ def test_a_gap_wider_than_the_step():
     def strips(end):
         return ground(region(-1, end), region(0.6, 3))
 
-    p = Problem(strips(0.25), goal=(0.7, 0.0), goal_tolerance=(0.05, 0.05), slots=8, end_effectors=FEET)
+    p = walk(strips(0.25), 0.7, 8)
     error = explained(p, replace(p, terrain=strips(0.6)), replace(p, terrain=strips(0.29)))
     assert str(error) == (
         "infeasible: regions 0–1: gap 0.35 m exceeds the 0.30 m step (conflicting: goal, end, regions, step)"
@@ -131,7 +138,7 @@ def test_a_gap_wider_than_the_step():
 
 def test_of_two_gaps_the_one_that_can_be_crossed_is_not_named():
     strips = region(-1, 0.25), region(0.3, 0.38), region(0.7, 3)
-    p = Problem(ground(*strips), goal=(0.8, 0.0), goal_tolerance=(0.05, 0.05), slots=8, end_effectors=FEET)
+    p = walk(ground(*strips), 0.8, 8)
     error = explained(p, replace(p, terrain=ground(strips[0], region(0.3, 0.7), strips[2])))
     assert [d.regions for d in error.details] == [(1, 2)]
     assert "regions 1–2: gap 0.32 m exceeds the 0.30 m step" in str(error)
@@ -139,7 +146,7 @@ def test_of_two_gaps_the_one_that_can_be_crossed_is_not_named():
 
 def test_all_gaps_are_named_that_must_be_closed():
     strips = region(-1, 0.3), region(0.7, 0.8), region(1.2, 3)
-    p = Problem(ground(*strips), goal=(1.2, 0.0), goal_tolerance=(0.1, 0.1), slots=10, end_effectors=FEET)
+    p = walk(ground(*strips), 1.2, 10, near=0.1)
     closed = region(-1, 0.7), region(0.7, 1.2), strips[2]
     assert possible(replace(p, terrain=ground(*closed[:1], *strips[1:])), PLENTY) is False
     error = explained(p, replace(p, terrain=ground(*closed)))
@@ -159,7 +166,7 @@ def test_a_gap_wider_than_legs_reach_is_not_blamed_on_the_step():
     def strips(end):
         return ground(region(-1, end), region(0.65, 3))
 
-    p = Problem(strips(0.25), goal=(0.75, 0.0), goal_tolerance=(0.05, 0.05), slots=6, end_effectors=FEET)
+    p = walk(strips(0.25), 0.75, 6)
     p = limited(p, step=(1.0, 0.15))
     error = explained(p, replace(p, terrain=strips(0.65)))
     found = reason(error, "regions")
@@ -170,13 +177,7 @@ def test_a_gap_wider_than_legs_reach_is_not_blamed_on_the_step():
 
 
 def test_a_step_up_is_measured_against_the_reach():
-    p = Problem(
-        ground(region(-1, 0.3), region(0.3, 2, z=0.3)),
-        goal=(0.6, 0.0),
-        goal_tolerance=(0.1, 0.1),
-        slots=6,
-        end_effectors=FEET,
-    )
+    p = walk(ground(region(-1, 0.3), region(0.3, 2, z=0.3)), 0.6, 6, near=0.1)
     level = replace(p, terrain=ground(region(-1, 0.3), region(0.3, 2)))
     error = explained(p, level, reaching(p, 2, 0.079))
     assert possible(reaching(p, 2, 0.081), PLENTY) is True
@@ -229,7 +230,7 @@ def test_a_region_too_small_to_stand_on():
     def strip(more):
         return ground(region(-1, 0.25), region(0.35 - more, 1.1 + more, -0.05 - more, 0.05 + more))
 
-    p = Problem(strip(0), goal=(0.6, 0.0), goal_tolerance=(0.05, 0.05), slots=6, end_effectors=FEET)
+    p = walk(strip(0), 0.6, 6)
     lacks = np.abs(p.robot.stance[:, 1]).max() - 0.06 - 0.05
     error = explained(p, *(replace(p, terrain=strip(lacks + more)) for more in (1e-4, -1e-3)))
     found = reason(error, "regions")
@@ -247,10 +248,8 @@ def test_legs_too_weak_for_the_weight():
 
 
 def test_patterns_without_a_swing():
-    p = Problem(
-        FLAT, goal=(0.4, 0.0), goal_tolerance=(0.05, 0.05), slots=5, end_effectors=FEET, patterns=((),)
-    )
-    error = explained(p, Problem(FLAT, goal=(0.4, 0.0), goal_tolerance=(0.05, 0.05), slots=5))
+    p = walk(FLAT, 0.4, 5, patterns=((),))
+    error = explained(p, walk(FLAT, 0.4, 5))
     assert {"goal", "patterns"} <= set(error.groups)
     assert "no leg may swing" in str(error)
     assert "the goal (0.40, 0.00) must be met within 0.05 m along x" in str(error)
@@ -264,13 +263,7 @@ def test_wheels_all_round_and_no_slot_to_put_a_foot_down():
 
 
 def test_ice_takes_more_time():
-    p = Problem(
-        ground(region(-1, 2, mu_foot=0.02)),
-        goal=(0.2, 0.0),
-        goal_tolerance=(0.05, 0.05),
-        slots=3,
-        end_effectors=FEET,
-    )
+    p = walk(ground(region(-1, 2, mu_foot=0.02)), 0.2, 3)
     error = explained(p, replace(p, terrain=FLAT))
     slots = reason(error, "slots")
     enough = int(slots.limit + slots.missing)
@@ -281,7 +274,7 @@ def test_ice_takes_more_time():
 
 
 def test_a_speed_limit_too_low_for_the_goal():
-    p = Problem(FLAT, goal=(0.4, 0.0), goal_tolerance=(0.05, 0.05), slots=4, end_effectors=FEET)
+    p = walk(FLAT, 0.4, 4)
     p = limited(replace(p, beyond_reach=True), speed=(0.2, 0.1))
     found = reason(error := explained(p, limited(p, speed=(0.8, 0.1))), "speed")
     assert {"goal", "speed"} <= set(error.groups)
@@ -291,7 +284,7 @@ def test_a_speed_limit_too_low_for_the_goal():
 
 
 def test_steps_too_short_for_the_goal():
-    p = Problem(FLAT, goal=(0.4, 0.0), goal_tolerance=(0.05, 0.05), slots=5, end_effectors=FEET)
+    p = walk(FLAT, 0.4, 5)
     found = reason(error := explained(limited(p, step=(0.05, 0.15)), p), "step")
     assert {"goal", "step"} <= set(error.groups)
     assert possible(limited(p, step=(0.05 + found.missing - 1e-3, 0.15)), PLENTY) is False
@@ -302,13 +295,7 @@ def test_steps_too_short_for_the_goal():
     "p",
     [
         Problem(FLAT, goal=(0.0, 0.0), slots=3, start_offsets=offsets(FL=(0.3, 0.0))),
-        Problem(
-            ground(region(-1, 0.3), region(0.8, 2)),
-            goal=(0.8, 0.0),
-            goal_tolerance=(0.1, 0.1),
-            slots=6,
-            end_effectors=FEET,
-        ),
+        walk(ground(region(-1, 0.3), region(0.8, 2)), 0.8, 6, near=0.1),
     ],
 )
 def test_no_group_can_be_left_out(p):
@@ -323,9 +310,20 @@ def test_no_group_can_be_left_out(p):
         assert feasible(set(groups) - {group}) is True
 
 
+@pytest.mark.parametrize("seed", [0, 4, 8, 25, 28, 34])
+def test_with_all_limits_the_elastic_program_is_the_problem(seed):
+    rng = np.random.default_rng(seed)
+    p = random_problem(rng, slots=4)
+    goal, near = (rng.uniform(0.3, 0.6), rng.uniform(-0.1, 0.1)), tuple(rng.uniform(0.01, 0.1, 2))
+    p = replace(p, goal=goal, goal_tolerance=near)
+    elastic = explain.Elastic(p, PLENTY, PLENTY)
+    assert elastic.feasible(elastic.parts) is possible(p, PLENTY) is not None
+    assert elastic.feasible([]) is True
+
+
 def test_the_search_raises_the_explanation():
     stones = ground(region(-1, 0.3), region(0.8, 2))
-    p = Problem(stones, goal=(0.5, 0.0), goal_tolerance=(0.1, 0.1), slots=3, end_effectors=FEET)
+    p = walk(stones, 0.5, 3, near=0.1)
     with pytest.raises(InfeasibleError, match=r"regions 0–1: gap 0\.50 m exceeds the 0\.30 m step"):
         solve(p)
 

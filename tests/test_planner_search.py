@@ -231,7 +231,7 @@ def test_progress_is_monotonous():
 
 def test_an_infeasible_problem_names_a_minimal_set_of_groups():
     apart = np.array([[0.16, 0.0], [0.16, 0.0], [-0.16, 0.0], [-0.16, 0.0]])
-    with pytest.raises(InfeasibleError, match="start posture") as caught:
+    with pytest.raises(InfeasibleError, match="leg FL starts at") as caught:
         solve(problem(1, goal=(0.0, 0.0), start_offsets=apart))
     assert "start" in caught.value.groups and "end" in caught.value.groups
     assert "friction" not in caught.value.groups

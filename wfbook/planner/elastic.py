@@ -183,10 +183,17 @@ class Elastic:
     def _box(
         self, region: int, held: Collection[Part], given: Mapping[Part, float]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the corners of the box around what the edges that hold leave of a region's plane."""
+        """Return the corners of the box around what the edges that hold leave of a region's plane.
+
+        Around nothing, the lower one is above the upper one, infinitely far from everything.
+        """
         edges = [(a, b + given.get(part, 0.0)) for part, a, b in self._edges(region) if part in held]
         outline = clipped(self._wide.square, edges)
-        return (outline.min(axis=0), outline.max(axis=0)) if len(outline) else (np.full(2, np.inf),) * 2
+        return (
+            (outline.min(axis=0), outline.max(axis=0))
+            if len(outline)
+            else (np.full(2, np.inf), np.full(2, -np.inf))
+        )
 
     def _edges(self, region: int) -> list[tuple[Part, np.ndarray, float]]:
         """Return a region's half-spaces ``a · p ≤ b``, each with its part."""

@@ -68,11 +68,9 @@ class InfeasibleError(ValueError):
 
 
 def _when(details: tuple[Reason, ...]) -> str:
-    """Say in which slots the conflict shows, if not in all."""
+    """Say within how many slots the conflict shows, if not in all, and not at once."""
     slots = details[0].slots
-    if slots is None:
-        return ""
-    return f"; already in slot{'' if slots[0] == slots[1] else f's {slots[0]} to'} {slots[1]}"
+    return f"; already in slots 0 to {slots[1]}" if slots and slots[1] > 0 else ""
 
 
 class NoPlanError(RuntimeError):

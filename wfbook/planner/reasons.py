@@ -328,7 +328,7 @@ class _Inquiry:
             if kind in ("x", "y"):
                 limit, missing = self.problem.limits.rest_offset["xy".index(kind)], self._missing(parts)
                 text = f"{_named(legs)} must end within {_number(limit)} m of nominal {_ALONG[kind]}"
-                text += f", at least {_number(missing)} m too near" if missing else ""
+                text += f", at least {_number(missing)} m too tight" if missing else ""
                 found.append(Reason("end", text, names, (), None, limit, missing))
             elif kind == "foot":
                 found.append(Reason("end", "one leg must end on a foot"))
