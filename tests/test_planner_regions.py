@@ -1,11 +1,14 @@
 """Bounds on several regions: what they cut off must not be missed, what they keep must be there."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from wfbook import terrain
-from wfbook.planner import Problem, solve
+from wfbook.planner import NoPlanError, Problem, crossings, solve
 from wfbook.planner.bounds import MotionBounds
+from wfbook.planner.conic import Solution
 from wfbook.planner.gait import Gait
 from wfbook.planner.gaits import dive, templates
 from wfbook.planner.ground import GroundMap, Places
@@ -103,3 +106,35 @@ def test_boxes_of_places_hold_what_a_plan_does(seed):
             assert places.reachable[r, leg, j]
             assert (places.within[r, :, leg, j] - 1e-6 <= point).all()
             assert (point <= places.upto[r, :, leg, j] + 1e-6).all()
+
+
+EDGE = problem(
+    terrain.ramp(start=0.2, length=0.1),
+    slots=2,
+    goal=(0.12, 0.0),
+    start_end_effectors=("wheel", "wheel", "wheel", "foot"),
+    start_offsets=np.array([[0.05, 0.0], [0.0, 0.0], [0.0, 0.0], [0.0, 0.0]]),
+)
+"""Three wheels near an edge: every plan that moves has to say between which knots it crosses."""
+
+
+@pytest.mark.parametrize("gap", [1e-3, 5e-5])
+def test_a_gap_is_proven_over_crossings_too_however_small(gap):
+    plan = solve(EDGE, gap=gap)
+    assert plan.meta["status"] == "optimal"
+    assert plan.meta["gap"] <= gap * (1 + 1e-9)
+
+
+def test_a_solver_without_an_answer_proves_nothing(monkeypatch):
+    real = crossings.solve_fixed
+
+    def silent(conic, columns, values):
+        found = real(conic, columns, values)
+        return found if len(columns) < crossings_known else Solution("failed", np.nan, -np.inf, found.y)
+
+    few = replace(EDGE, slots=1, goal=(0.02, 0.0), patterns=((),))
+    crossings_known = sum(v.size for v in Kernel(few).program.discrete.values())
+    monkeypatch.setattr(crossings, "solve_fixed", silent)
+    # Every gait with all integers fixed is without an answer: neither a plan nor a proof that there is none.
+    with pytest.raises(NoPlanError, match="could not tell"):
+        solve(few)

@@ -17,7 +17,7 @@ from wfbook.planner.problem import Problem
 from wfbook.planner.program import Program
 
 CLOSE = 2e-4
-"""Relative gap at which the search for crossings ends; it stays in the bound."""
+"""Relative gap at which the search for crossings ends, if none is asked for; it stays in the bound."""
 
 _NODES = 30
 _QUICK = 4
@@ -26,14 +26,15 @@ _QUICK = 4
 class Crossings:
     """Solves the tight program where all discrete variables are known but those of crossings."""
 
-    def __init__(self, program: Program, conic: Conic):
+    def __init__(self, program: Program, conic: Conic, close: float = CLOSE):
         """Note where the variables stand.
 
         Args:
             program: the tight one.
             conic: the same, compiled.
+            close: relative gap at which the search ends.
         """
-        self._program, self._conic = program, conic
+        self._program, self._conic, self._close = program, conic, close
 
     def solve(self, columns: np.ndarray, values: np.ndarray, cutoff: float, quick: bool) -> Solution:
         """Minimise over all crossings.
@@ -54,20 +55,23 @@ class Crossings:
         if found.bound >= cutoff:
             return replace(found, status="cut", value=np.nan)
         best: Solution | None = None
-        queue = [(found.bound, 0, values, found)]
+        # Bounds of what stays open: nodes that wait, and such as a solver has no answer for.
+        queue, unclear = [(found.bound, 0, values, found)], np.inf
         for count in range(1, _QUICK if quick else _NODES):
-            if not queue or queue[0][0] >= min(cutoff, best.value * (1 - CLOSE) if best else np.inf):
+            if not queue or queue[0][0] >= self._enough(cutoff, best):
                 break
-            _, _, known, relaxed = heapq.heappop(queue)
+            bound, _, known, relaxed = heapq.heappop(queue)
             rounded = self._where_it_is(known, relaxed.y)
             tried = solve_fixed(self._conic, columns, rounded)
             if tried.status == "solved" and (best is None or tried.value < best.value):
                 best = tried
-            if best and (quick or relaxed.bound >= best.value * (1 - CLOSE)):
-                heapq.heappush(queue, (relaxed.bound, -count, known, relaxed))
+            if best and (quick or bound >= best.value * (1 - self._close)):
+                unclear = min(unclear, bound)
                 break
             left = np.flatnonzero(np.isnan(known))
             if not len(left):
+                if tried.status == "failed":
+                    unclear = min(unclear, bound)
                 continue
             doubt = np.abs(relaxed.y[columns[left]] - rounded[left])
             at = left[np.argmax(doubt)]
@@ -77,15 +81,18 @@ class Crossings:
                 fixed = ~np.isnan(child)
                 answer = solve_fixed(self._conic, columns[fixed], child[fixed])
                 if answer.status != "infeasible":
-                    bound = max(answer.bound, relaxed.bound)
-                    heapq.heappush(queue, (bound, 2 * count + side, child, answer))
-        bound = min((entry[0] for entry in queue), default=np.inf)
-        if best is None and not queue:
+                    heapq.heappush(queue, (max(answer.bound, bound), 2 * count + side, child, answer))
+        bound = min([unclear, *(entry[0] for entry in queue)])
+        if best is None and bound == np.inf:
             return Solution("infeasible", np.inf, np.inf, found.y)
         if best is None:
             return Solution("rough" if quick else "cut", np.inf, bound, found.y)
-        status = "rough" if bound < min(cutoff, best.value * (1 - CLOSE)) else "solved"
+        status = "rough" if bound < self._enough(cutoff, best) else "solved"
         return Solution(status, best.value, min(best.bound, bound), best.y)
+
+    def _enough(self, cutoff: float, best: Solution | None) -> float:
+        """Return the bound from which on a node is of no interest."""
+        return min(cutoff, best.value * (1 - self._close)) if best else cutoff
 
     def _where_it_is(self, known: np.ndarray, y: np.ndarray) -> np.ndarray:
         """Return the values with every open wheel in the region over which it is in a solution."""

@@ -113,7 +113,6 @@ def improve(
 
     Args:
         kernel: bounds and leaves of the problem.
-        first: gaits to try besides the templates.
         stop: asked now and then; once true, nothing more is tried.
         known: gaits to try before all others, such as the rest of an earlier plan.
 

@@ -16,7 +16,7 @@ from wfbook.planner.bounds import MotionBounds, tightened
 from wfbook.planner.boxes import Boxes
 from wfbook.planner.conic import Boxed, Conic, Solution
 from wfbook.planner.contacts import assignment
-from wfbook.planner.crossings import Crossings
+from wfbook.planner.crossings import CLOSE, Crossings
 from wfbook.planner.gait import UNKNOWN, Gait
 from wfbook.planner.ground import Places
 from wfbook.planner.presolve import solve_fixed
@@ -38,6 +38,7 @@ class Kernel:
         program: the tight formulation, whose value at fixed binaries is the truth.
         boxes: of gaits.
         motion: bounds within which the relaxation holds.
+        precision: relative gap to which a leaf's value is known.
         excluded: gaits that are not to be found (they could not be polished).
         qps: relaxations solved so far.
         leaves: exact programs solved so far.
@@ -46,6 +47,7 @@ class Kernel:
     """
 
     problem: Problem
+    precision: float = CLOSE
     program: Program = field(init=False)
     boxes: Boxes = field(init=False)
     motion: MotionBounds = field(init=False)
@@ -63,7 +65,7 @@ class Kernel:
         self._discrete = np.concatenate(
             [self.conic.columns(v).ravel() for v in self.program.discrete.values()]
         )
-        self._crossings = Crossings(self.program, self.conic)
+        self._crossings = Crossings(self.program, self.conic, self.precision)
         self._leaves: dict[bytes, Solution] = {}
         self._mirror = cp.Variable()
         self._symmetric = mirror_symmetric(problem)
@@ -200,10 +202,6 @@ class Kernel:
         found = self._bounds.get(_key(lower, upper))
         return None if found is None or (found.status == "cut" and found.bound < cutoff) else found
 
-    def values(self, solution: Solution) -> np.ndarray:
-        """Return the branching variables' values in a relaxation's solution."""
-        return solution.y
-
     def bound(self, lower: np.ndarray, upper: np.ndarray, cutoff: float = np.inf) -> Solution:
         """Solve the QP relaxation over a box; remembered, for children are bounded before they are made.
 
@@ -221,6 +219,9 @@ class Kernel:
     def leaf(self, gait: Gait, cutoff: float = np.inf, quick: bool = False) -> Solution:
         """Solve the exact program at fixed binaries; infeasible if the gait is excluded.
 
+        What is left open keeps the proven bound below its own, unless ``quick``: then the gait will be asked
+        for again before its box is closed.
+
         Args:
             gait: with its regions.
             cutoff: if the gait can't cost less, its cost may stay unknown (status "cut").
@@ -235,6 +236,8 @@ class Kernel:
         found = self._leaves[key]
         if found.status in ("solved", "cut") or (found.status == "rough" and not quick):
             self.pruned = min(self.pruned, found.bound)
+        elif found.status == "failed" and not quick:
+            self.pruned = min(self.pruned, self._gait_qp(gait).bound)
         return found
 
     @staticmethod
@@ -252,11 +255,9 @@ class Kernel:
         return [leaf.value if leaf.status in ("solved", "rough") else np.inf for leaf in leaves]
 
     def _enter(self, gait: Gait, found: Solution) -> None:
-        """Remember a leaf; what it leaves open keeps the proven bound below its own."""
+        """Remember a leaf."""
         self.leaves += 1
         self._leaves[gait.key] = found
-        if found.status == "failed":
-            self.pruned = min(self.pruned, self._gait_qp(gait).bound)
 
     def _exact(self, gait: Gait, cutoff: float, quick: bool) -> Solution:
         assigned = assignment(self.problem, gait, self.program.discrete)

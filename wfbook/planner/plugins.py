@@ -67,7 +67,7 @@ class Split(Branchrule):
             before = tree.incumbent
             if self._placed(box):
                 return {"result": SCIP_RESULT.CUTOFF}
-            self._round(kernel.values(found))
+            self._round(found.y)
             if tree.incumbent < before:
                 tree.submit()
         if (box[0] == box[1]).all():

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from wfbook.planner import bigm
+from wfbook.planner.crossings import CLOSE
 from wfbook.planner.explain import InfeasibleError, NoPlanError, check_start, why_not
 from wfbook.planner.extract import fill, gait_of, plan_of, read
 from wfbook.planner.gait import Gait
@@ -37,9 +38,9 @@ def solve(
         progress: called now and then while the tight formulation is searched.
 
     Returns:
-        The relaxed plan. ``meta`` holds objective, bound, gap, nodes, status ("optimal", "time limit"
-        or "interrupted"), solve_time and build_time in seconds. A time limit or an interrupt returns
-        the incumbent and what was proven.
+        The relaxed plan. ``meta`` holds objective, bound, gap, nodes, status ("optimal", "time limit",
+        "interrupted", or "unclear" where a solver's failure keeps the gap open), solve_time and build_time
+        in seconds. A time limit or an interrupt returns the incumbent and what was proven.
 
     Raises:
         ValueError: an argument is wrong.
@@ -147,7 +148,7 @@ class Search:
         begin = time.perf_counter()
         self.problem, self.gap, self.progress, self.gaits = problem, gap, progress, gaits
         self.explain = explain
-        self.kernel = Kernel(problem)
+        self.kernel = Kernel(problem, min(CLOSE, 0.2 * gap))
         self.build_time = time.perf_counter() - begin
         self._left = time_limit
         self._spent, self._nodes = 0.0, 0
@@ -176,6 +177,8 @@ class Search:
         if tree.best is None:
             if status == "interrupted":
                 raise KeyboardInterrupt
+            if status == "unclear":
+                raise NoPlanError("no plan found, but for some gaits the solver could not tell")
             raise NoPlanError(f"no plan found within {self._spent:.1f} s")
         self._bound, self._root_bound, self._status = bound, tree.root_bound, status
         return self._plan(tree.best[1])

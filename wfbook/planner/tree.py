@@ -86,7 +86,8 @@ class Tree:
         """Search.
 
         Returns:
-            Status ("optimal", "infeasible", "time limit" or "interrupted"), proven bound, node count.
+            Status ("optimal", "infeasible", "unclear", "time limit" or "interrupted"), proven bound, node
+            count. It is unclear where the tree is exhausted, but a solver had no answer for some leaf.
         """
         with self._interruptible():
             root = self.kernel.boxes.root()
@@ -103,11 +104,12 @@ class Tree:
         if self.error is not None:
             raise self.error
         exhausted = self.model is None or self.model.getStatus() in ("infeasible", "optimal", "inforunbd")
-        if self.best is None and exhausted:
+        # A leaf without an answer, which lowered what is proven, may have been the plan.
+        if self.best is None and exhausted and self.kernel.pruned == np.inf:
             return "infeasible", np.inf, nodes
         if self.best is not None and self.incumbent - bound <= self.gap * self.incumbent * (1 + 1e-9):
             return "optimal", bound, nodes
-        return "time limit", bound, nodes
+        return "unclear" if exhausted else "time limit", bound, nodes
 
     def _prepare(self) -> dict[str, Any]:
         """Find a first plan, and narrow the search to what is better."""

@@ -34,8 +34,9 @@ OUTCOME = (
 )
 """What an outcome tells; what is unknown is None.
 
-``status`` is "optimal", "time limit", "no plan" (time ran out before the first), "infeasible", "refused"
-(the planner doesn't take such a problem), or "failed" (a crash); ``message`` explains the last four.
+``status`` is that of :func:`wfbook.planner.solve` if there is a plan; else "no plan" (it gave up before the
+first), "infeasible", "refused" (the planner doesn't take such a problem), or "failed" (a crash), and
+``message`` explains.
 ``build_s`` is modelling and compiling. ``search_s`` is the median of ``searches_s``, or the time limit if
 there is no plan. ``peak_memory_mb`` adds the peaks of the process and of the largest that it forked, so pages
 that they share count twice.
