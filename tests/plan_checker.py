@@ -317,6 +317,9 @@ def _limits(p: Trajectory, ledger: Ledger) -> None:
         if p.meta["options"]["final_stance"]:
             offset = np.abs(p.p[-1, leg, :2] - p.x[-1, :2] - p.meta["stance"][leg])
             ledger.add("rest offset", np.maximum(0.0, offset - limits["rest_offset"]), leg, p.K)
+    if near := p.meta["options"].get("goal_tolerance"):
+        away = np.abs(p.x[-1, :2] - p.meta["goal"])
+        ledger.add("goal tolerance", np.maximum(0.0, away - near), knot=p.K)
 
 
 def objective(plan: Any) -> float:

@@ -5,6 +5,7 @@ import re
 from dataclasses import replace
 
 import numpy as np
+import plan_checker
 import pytest
 from terrain_cases import random_problem
 
@@ -358,6 +359,9 @@ def test_a_required_goal_is_met_and_survives_the_plan_file():
     assert abs(plan.x[-1, 0] - 0.25) < 0.01 + 1e-6
     assert problem_of(plan).goal_tolerance == (0.01, 0.02)
     assert problem_of(free).goal_tolerance is None
+    assert plan_checker.check(plan)[0] == []
+    (missed,) = plan_checker.check(free.with_meta(options=plan.meta["options"]))[0]
+    assert missed.equation == "goal tolerance"
 
 
 @pytest.mark.parametrize("bad", [(0.1,), (0.1, 0.0), (math.nan, 0.1), 0.1])
