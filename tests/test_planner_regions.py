@@ -7,7 +7,7 @@ import pytest
 
 from wfbook import terrain
 from wfbook.planner import NoPlanError, Problem, crossings, solve
-from wfbook.planner.bounds import MotionBounds
+from wfbook.planner.bounds import MotionBounds, tightened
 from wfbook.planner.conic import Solution
 from wfbook.planner.gait import Gait
 from wfbook.planner.gaits import dive, templates
@@ -62,6 +62,29 @@ def test_narrowed_motion_holds_the_optimum_and_its_bound():
     box = kernel.boxes.root()
     assert (box[0] <= z).all()
     assert (z <= box[1]).all()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_narrowed_ranges_hold_all_that_is_cheap_in_spite_of_a_rough_solver(seed):
+    """Of a quadratic cost the range at a cost of U is known: c·y is least at −√(U c' Q⁻¹ c)."""
+    rng = np.random.default_rng(seed)
+    p = problem(STONES, slots=3)
+    n, cutoff = 4, 10.0 ** rng.uniform(-3, 0)
+    root = rng.normal(size=(n, n)) + 2 * np.eye(n)
+    inverse = np.linalg.inv(root @ root.T)
+    rows = 0.1 * rng.normal(size=(3, n))  # of the order of the decimetres that the first probe expects
+
+    def minimise(linear):
+        value = -0.25 * linear @ inverse @ linear  # of y'Qy + linear·y
+        return value + rng.uniform(-1, 1) * 1e-5, -0.5 * linear @ inverse @ linear
+
+    wide = replace(MotionBounds.of(p), travel=np.array([[-9.0] * 3, [9.0] * 3]))
+    narrow = tightened(wide, {"travel": rows}, minimise, 0.0, cutoff, lambda: False).travel
+    least = -np.sqrt(cutoff * np.einsum("ji,ik,jk->j", rows, inverse, rows))
+    assert (narrow[0] <= least).all()
+    assert (narrow[1] >= -least).all()
+    if cutoff > 1e-2:
+        assert (narrow[0] >= 1.1 * least - 0.01).all(), "two probes come near"
 
 
 def test_a_ladder_says_which_region():

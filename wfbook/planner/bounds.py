@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-_MARGIN = 1e-4
-"""Of a metre: what a solver's tolerance may take from a bound."""
+_TOLERANCE = 5e-5
+"""Of the cost: what the node QP's rough solver may be wrong by; divided by the multiplier, in metres."""
 
 _PROBES = 2
 
@@ -91,10 +91,10 @@ def _least(
         value, part = minimise(multiplier * row)
         if not np.isfinite(value):
             break
-        best = max(best, (value - cutoff) / multiplier)
+        best = max(best, (value - _TOLERANCE * (1.0 + abs(value)) - cutoff) / multiplier)
         spent = value - part - base  # what the minimiser pays for going there
         if spent <= 1e-9:
             multiplier *= 4.0
         else:
             multiplier *= float(np.clip(np.sqrt((cutoff - base) / spent), 0.1, 10.0))
-    return best - _MARGIN
+    return best

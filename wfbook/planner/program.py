@@ -2,7 +2,7 @@
 
 Forces are in body weights, ``F = λ / (m g)``, so that levers and forces are numbers of one size;
 components come first, ``force[i]`` of shape ``(K, L)``. The two formulations (:mod:`.tight` and
-:mod:`.paper`) add what ties the binaries to this.
+:mod:`.bigm`) add what ties the binaries to this.
 """
 
 from collections.abc import Sequence
