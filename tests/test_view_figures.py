@@ -103,7 +103,7 @@ def test_tracking_is_in_millimetres_and_degrees():
 def test_torque_of_forces_agrees_with_the_cross_product():
     plan = small_plan()
     middle = 0.5 * ((plan.p - plan.x[:, None])[1:] + (plan.p - plan.x[:, None])[:-1])
-    assert np.allclose(figures.contact_torques(plan), np.cross(middle, plan.lam).sum(axis=1))
+    assert np.allclose(plan.contact_torque, np.cross(middle, plan.lam).sum(axis=1))
 
 
 def test_torque_mismatch_draws_the_claim_and_the_truth():
@@ -113,7 +113,7 @@ def test_torque_mismatch_draws_the_claim_and_the_truth():
     for row, axes in enumerate(figure.axes[::2]):
         data = {patch.get_gid(): patch.get_data().values for patch in axes.patches if patch.get_gid()}
         assert np.allclose(data["claimed"], claimed[:, row])
-        assert np.allclose(data["real"], figures.contact_torques(plan)[:, row])
+        assert np.allclose(data["real"], plan.contact_torque[:, row])
 
 
 def test_pictures_show_themselves_the_same_each_time_on_white():

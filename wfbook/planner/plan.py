@@ -7,6 +7,7 @@ from typing import Any, Self
 import numpy as np
 
 from wfbook import archive
+from wfbook.centroidal import contact_torque
 from wfbook.modes import END_EFFECTORS, LEGS, end_effector_types, lift_off_types
 from wfbook.terrain import Terrain
 
@@ -93,6 +94,18 @@ class Plan:
     def lift_off_end_effector(self) -> np.ndarray:
         """``(L, J)`` int8: what each leg carried at the end of the slot before."""
         return lift_off_types(self.D, self.meta["start_end_effectors"])
+
+    @property
+    def middle_lever(self) -> np.ndarray:
+        """``(K, L, 3)`` levers ``p − x`` at the middle of each interval."""
+        lever = self.p - self.x[:, None]
+        return 0.5 * (lever[:-1] + lever[1:])
+
+    @property
+    def contact_torque(self) -> np.ndarray:
+        """``(K, 3)`` torque about the centre of mass that the contact forces really make (Paper A, eq. 8)."""
+        lever, force = (np.moveaxis(part, -1, 0) for part in (self.middle_lever, self.lam))
+        return np.stack([torque.sum(axis=1) for torque in contact_torque(lever, force)], axis=-1)
 
     def with_meta(self, **changes: Any) -> Self:
         """Return the same plan with entries of ``meta`` changed."""

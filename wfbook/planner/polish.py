@@ -89,7 +89,8 @@ class Polisher:
         gait = gait_of(plan)
         columns, fixed = self._binaries(gait, plan.p)
         margins = self._margins(gait)
-        lever, force = _middle_levers(plan), [plan.lam[..., i] / weight for i in range(3)]
+        lever = list(np.moveaxis(plan.middle_lever, -1, 0))
+        force = [plan.lam[..., i] / weight for i in range(3)]
         radius, best, merit, steps = np.array([0.05, 0.25]), None, np.inf, 0
         cost = np.inf
         while steps < _ITERATIONS:
@@ -257,10 +258,8 @@ def torque_mismatch(plan: Plan) -> np.ndarray:
     Returns:
         ``(3,)``.
     """
-    force = [plan.lam[..., i] for i in range(3)]
-    torque = np.stack([tau.sum(axis=1) for tau in contact_torque(_middle_levers(plan), force)], axis=-1)
     inertia = np.array(plan.meta["inertia"])
-    return np.sqrt(np.mean((plan.alpha @ inertia.T - torque) ** 2, axis=0))
+    return np.sqrt(np.mean((plan.alpha @ inertia.T - plan.contact_torque) ** 2, axis=0))
 
 
 def repaired(plan: Plan) -> bool:
@@ -270,9 +269,3 @@ def repaired(plan: Plan) -> bool:
 
 def _farthest(new: list[np.ndarray], old: list[np.ndarray]) -> float:
     return float(max(np.abs(a - b).max() for a, b in zip(new, old, strict=True)))
-
-
-def _middle_levers(plan: Plan) -> list[np.ndarray]:
-    lever = plan.p - plan.x[:, None, :]
-    middle = 0.5 * (lever[1:] + lever[:-1])
-    return [middle[..., i] for i in range(3)]

@@ -11,7 +11,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
 from scipy.spatial import ConvexHull
 
-from wfbook.centroidal import contact_torque
 from wfbook.modes import LEGS
 from wfbook.view.spans import plan_modes, spans
 from wfbook.view.style import (
@@ -228,7 +227,7 @@ def torque_mismatch(relaxed: "Plan", polished: "Plan") -> Picture:
     grid = figure.subplots(3, 2, sharex=True, sharey=True)  # one scale: large and small torques side by side
     for column, (name, plan) in enumerate((("relaxed", relaxed), ("polished", polished))):
         claimed = (plan.U_plus - plan.U_minus).sum(axis=1) / 4.0
-        real = contact_torques(plan)
+        real = plan.contact_torque
         for axis, axes in enumerate(grid[:, column]):
             tidy(axes)
             step = np.append(claimed[:, axis], claimed[-1, axis]), np.append(real[:, axis], real[-1, axis])
@@ -248,15 +247,3 @@ def torque_mismatch(relaxed: "Plan", polished: "Plan") -> Picture:
     ]
     figure.legend(handles=handles, loc="outside upper center", ncols=3, frameon=False)
     return figure
-
-
-def contact_torques(plan: "Plan") -> np.ndarray:
-    """Return the torque about the centre of mass that a plan's forces really make (Paper A, eq. 8).
-
-    Returns:
-        (K, 3), N m, world axes; levers are taken at the middle of each interval.
-    """
-    lever = plan.p - plan.x[:, None]
-    lever = 0.5 * (lever[:-1] + lever[1:])
-    torque = contact_torque(np.moveaxis(lever, -1, 0), np.moveaxis(plan.lam, -1, 0))
-    return np.stack([component.sum(axis=1) for component in torque], axis=-1)
