@@ -34,7 +34,7 @@ def relaxed(terrain: Terrain, goal: float, legs: list[str], regions: list[list[i
     columns = np.concatenate([conic.columns(v).ravel() for v in program.discrete.values()])
     known = assignment(problem, gait, program.discrete)
     values = np.concatenate([known[key].ravel() for key in program.discrete])
-    found = Crossings(program, conic).solve(columns, values, np.inf)
+    found = Crossings(program, conic).solve(columns, values, np.inf, quick=False)
     assert found.status == "solved", f"this gait is {found.status}"
     fill(program, conic, found.y)
     meta = {

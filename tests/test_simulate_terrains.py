@@ -66,7 +66,7 @@ def test_the_robot_stays_up_and_arrives(case):
     assert metrics["upright"]
     assert metrics["distance_m"] == pytest.approx(plan.distance, abs=0.005)
     assert metrics["base_rms_m"] < 0.01
-    assert metrics["base_rms_rad"] < np.radians(3.0)
+    assert metrics["base_rms_rad"] < np.radians(1.5)
     assert metrics["final_speed_m_s"] < 0.005
 
 
@@ -86,7 +86,7 @@ def test_wheels_follow_the_plan_over_edges(case):
     _, _, result = case
     rolling = (result.end_effector == 1) & result.stance & result.in_contact & (result.t > 0)[:, None]
     away = result.p - result.p_ref - (result.com - result.com_ref)[:, None]
-    assert np.abs(away[rolling, 0]).max(initial=0.0) < 0.03
+    assert np.abs(away[rolling, 0]).max(initial=0.0) < 0.015
 
 
 def test_the_trunk_leans_with_the_footholds(case):

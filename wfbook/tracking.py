@@ -249,14 +249,18 @@ class Tracker:
         return p + com - x if self._kinds[leg] else p
 
     def _may_lift(self, leg: int, t: float) -> bool:
-        """Whether a leg due to lift leaves two others standing; if not, it waits for late ones a little."""
+        """Whether a leg due to lift leaves a diagonal pair standing; if not, it waits for late ones a little.
+
+        Two legs of one end or one side don't carry the robot (see
+        :data:`wfbook.modes.DIAGONAL_PATTERNS`).
+        """
         flight = self.flights[leg][self.lifted[leg]]
-        staying = [
-            other
+        staying = {
+            int(other)
             for other in np.flatnonzero(self.stance)
             if not any(f.start <= flight.start < f.end for f in self.flights[other])
-        ]
-        return len(staying) >= 2 or t > flight.start + _PATIENCE
+        }
+        return {0, 3} <= staying or {1, 2} <= staying or t > flight.start + _PATIENCE
 
     def _flight_path(self, flight: Swing, leg: int, start: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         """Return the path of a leg's end from lift-off to landing (Paper A, eqs 2–6).
