@@ -1,6 +1,6 @@
 """Is what the search proves true? Random small problems against a branch and bound without any shortcut.
 
-    python benchmarks/soundness.py [--count 100] [--seed 0] [--time-limit 30]
+    python benchmarks/soundness.py [--count 100] [--seed 0] [--time-limit 60]
 
 One to three regions, two to five slots, one and two end effectors. An instance agrees if both searches find
 it infeasible, or if the planner's bound is not above the other's optimum and its plan not more than the
@@ -23,7 +23,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--count", type=int, default=100)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--time-limit", type=float, default=30.0, help="of each plain search, in seconds")
+    parser.add_argument("--time-limit", type=float, default=60.0, help="of each plain search, in seconds")
     options = parser.parse_args()
     words: Counter[str] = Counter()
     columns = "  # regions groups slots kinds swings crossings  objective      bound      other  nodes     s"

@@ -49,17 +49,18 @@ class PlainSearch:
     unclear: int = 0
     _conic: Conic = field(init=False)
     _columns: np.ndarray = field(init=False)
-    _swings: np.ndarray = field(init=False)
-    _slot: np.ndarray = field(init=False)
+    _turn: np.ndarray = field(init=False)
 
     def __post_init__(self):
         program = tight.build(self.problem)
         self._conic = Conic.compile(program.cost, program.rows())
-        columns = {key: self._conic.columns(v).ravel() for key, v in program.discrete.items()}
-        self._columns = np.concatenate(list(columns.values()))
-        self._swings = np.full(len(self._columns), False)
-        self._swings[: columns["pattern"].size] = True
-        self._slot = np.arange(len(self._columns)) % self.problem.slots
+        columns, turns = [], []
+        for key, variable in program.discrete.items():
+            columns.append(self._conic.columns(variable).ravel())
+            kind = 0 if key == "pattern" else 2 if key[0].startswith("passing") else 1
+            slot = np.broadcast_to(np.arange(self.problem.slots), variable.shape)
+            turns.append(kind * self.problem.slots + slot.ravel())
+        self._columns, self._turn = np.concatenate(columns), np.concatenate(turns)
 
     def run(self, time_limit: float) -> bool:
         """Search until nothing is open; False if the time limit, in seconds of the processor, comes first."""
@@ -93,10 +94,10 @@ class PlainSearch:
         return children
 
     def _most_fractional(self, distance: np.ndarray) -> int:
-        open_ = self._swings & (distance > _INTEGRAL)
-        if open_.any():
-            first = self._slot[open_].min()
-            distance = np.where(open_ & (self._slot == first), distance, -1.0)
+        """Return the most fractional of the variables whose turn it is."""
+        fractional = distance > _INTEGRAL
+        if fractional.any():
+            distance = np.where(self._turn == self._turn[fractional].min(), distance, -1.0)
         return int(np.argmax(distance))
 
     def _closed(self, relaxed: Solution) -> bool:
