@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -63,7 +64,7 @@ def answers(monkeypatch):
     return install
 
 
-def processes(group):
+def living(group):
     """The living processes of a process group."""
     found = []
     for path in Path("/proc").glob("[0-9]*/stat"):
@@ -74,6 +75,16 @@ def processes(group):
         if int(pgid) == group and state not in "ZX":
             found.append(path.parent.name)
     return found
+
+
+def ended(group, patience=10.0):
+    """Whether all processes of a group end; a killed grandchild takes a moment, and nobody waits for it."""
+    until = time.monotonic() + patience
+    while living(group):
+        if time.monotonic() > until:
+            return False
+        time.sleep(0.01)
+    return True
 
 
 @pytest.fixture
@@ -104,7 +115,7 @@ def test_a_trial_has_a_process_and_a_memory_of_its_own(started):
     alone = found["peak_memory_mb"]
     assert 30 < alone < 2000
     assert shown
-    assert processes(started[0].pid) == []
+    assert ended(started[0].pid)
     ballast = np.concatenate([ballast] * 4)
     assert abs(trial.run(asked(2))["peak_memory_mb"] - alone) < 100
     del ballast
@@ -150,7 +161,7 @@ def test_an_interrupt_ends_all_processes_of_a_trial(started):
     with pytest.raises(KeyboardInterrupt):
         trial.run(asked(10), show)
     assert started[0].returncode == -signal.SIGKILL
-    assert processes(started[0].pid) == []
+    assert ended(started[0].pid)
 
 
 def test_a_trial_travels_as_it_is():

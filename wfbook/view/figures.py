@@ -78,7 +78,7 @@ def com_path(plan: "Plan", run: "Run | None" = None, polygons: bool = False) -> 
 
     Args:
         plan: its path is blue, its footholds green dots, its rolling contacts orange strokes; grey rings
-            are where the legs start.
+            are where the legs start. Several regions are outlined.
         run: when given, the measured path beside the planned one.
         polygons: also outline the support polygon of every slot.
 
@@ -88,6 +88,10 @@ def com_path(plan: "Plan", run: "Run | None" = None, polygons: bool = False) -> 
     figure = Picture(8.0, 3.6)
     axes = figure.add_subplot()
     tidy(axes)
+    if len(plan.terrain.regions) > 1:
+        for region in plan.terrain.regions:
+            # As an artist: the far ends of the ground must not widen the view.
+            axes.add_artist(Polygon(region.vertices[:, :2], fill=False, edgecolor=PALE, gid="region"))
     if polygons:
         _support_polygons(axes, plan)
     per_slot = plan.knots // plan.slots
@@ -192,7 +196,7 @@ def forces(plan: "Plan", run: "Run | None" = None, component: str = "z") -> Pict
 def tracking(run: "Run") -> Picture:
     """Draw how far the run is from its reference: the centre of mass in mm, the attitude in degrees.
 
-    The reference attitude is level, so the angles are themselves the error.
+    The trunk is to lean with the ground; the angles are how far it is from that.
     """
     figure = Picture(8.0, 3.8)
     top, bottom = figure.subplots(2, 1, sharex=True)
@@ -203,7 +207,7 @@ def tracking(run: "Run") -> Picture:
         angle_deg = np.rad2deg(run.rpy[:, i] - run.rpy_ref[:, i])
         bottom.plot(run.t, angle_deg, color=MEASURED, linestyle=style, linewidth=1.2, label=name, gid=name)
     top.set_ylabel("CoM error (mm)")
-    bottom.set_ylabel("attitude (°)")
+    bottom.set_ylabel("attitude error (°)")
     bottom.set_xlabel("time (s)")
     for axes in (top, bottom):
         tidy(axes)

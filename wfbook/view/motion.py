@@ -71,12 +71,14 @@ def motion_of_run(run: "Run") -> Motion:
 def motion_of_plan(plan: "Plan") -> Motion:
     """Pose the robot as a plan wants it, whether or not any controller could do it.
 
-    Between knots the motion is interpolated so that a foot which stands stays where it is.
+    Between knots the motion is interpolated so that a foot which stands stays where it is. The trunk leans
+    with the ground as the controller lets it.
 
     Raises:
         ValueError: the plan puts a leg where the Go1's can't reach.
     """
     from wfbook.go1_dynamics import Go1Dynamics
+    from wfbook.lean import Lean
 
     times = np.arange(plan.t[0], plan.t[-1] + 1e-9, 1.0 / FPS)
     com, theta, contact = (
@@ -85,13 +87,16 @@ def motion_of_plan(plan: "Plan") -> Motion:
     slot = np.clip(((times - plan.t[0] + 1e-9) / plan.slot_duration).astype(int), 0, plan.slots - 1)
     knot = np.clip(np.searchsorted(plan.t, times + 1e-9, side="right") - 1, 0, plan.knots - 1)
     wheel = plan.end_effector.T[slot]
-    robot = Go1Dynamics()
+    phase = (times - plan.t[0]) / plan.slot_duration - slot
+    centres = contact + RADII[wheel][..., None] * _normals(plan, slot, phase)
+    robot, lean = Go1Dynamics(), Lean(plan)
     qpos = []
-    for frame in range(len(times)):
-        centres = contact[frame] + np.outer(RADII[wheel[frame]], [0.0, 0.0, 1.0])
-        qpos.append(robot.posture(com[frame], theta[frame], centres))
+    for frame, time in enumerate(times - plan.t[0]):
+        qpos.append(robot.posture(com[frame], theta[frame] + lean.at(time)[0], centres[frame]))
     qpos = np.array(qpos)
-    rolled = np.vstack([np.zeros(len(LEGS)), np.diff(contact[:, :, 0], axis=0)]) * (wheel == 1)
+    forward = np.diff(contact[:, :, [0, 2]], axis=0)
+    rolled = np.vstack([np.zeros(len(LEGS)), np.sign(forward[..., 0]) * np.linalg.norm(forward, axis=2)])
+    rolled *= wheel == 1
     qpos[:, 10::4] = np.cumsum(rolled, axis=0) / WHEEL_RADIUS
     return Motion(
         start=float(times[0]),
@@ -104,3 +109,15 @@ def motion_of_plan(plan: "Plan") -> Motion:
         measured_com=None,
         terrain=plan.terrain,
     )
+
+
+def _normals(plan: "Plan", slot: np.ndarray, phase: np.ndarray) -> np.ndarray:
+    """Return the ground's normal under each leg, (N, 4, 3); in the air it turns from lift-off to landing."""
+    ground = np.array([region.normal for region in plan.terrain.regions])
+    regions = np.array(plan.meta.get("regions", plan.D.sum(axis=3).argmax(axis=2)))
+    first = [plan.terrain.region_at(x, y) for x, y in plan.p[0, :, :2]]
+    start = [own if under is None else under for own, under in zip(regions[:, 0], first, strict=True)]
+    normals = ground[np.column_stack([start, regions])]
+    blend = normals[:, slot] + phase[:, None] * (normals[:, slot + 1] - normals[:, slot])
+    blend /= np.linalg.norm(blend, axis=2, keepdims=True)
+    return np.swapaxes(blend, 0, 1)

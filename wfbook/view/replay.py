@@ -8,6 +8,7 @@ the legs stood and rolled, and the path of the centre of mass. A plan can be rep
 controller has seen it: then the robot is posed as the plan wants it.
 """
 
+import itertools
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -147,12 +148,18 @@ def _move_arrows(visualizer: Visualizer, tracks: Tracks, motion: Motion, scale: 
 
 
 def _draw_prints(visualizer: Visualizer, motion: Motion) -> None:
-    """Paint where the legs stood and rolled on the ground."""
-    for count, (leg, mode, start, stop) in enumerate(spans(motion.modes.T)):
+    """Paint where the legs stood and rolled on the ground; a track has a kink where it crosses an edge."""
+    terrain, count = motion.terrain, 0
+    for leg, mode, start, stop in spans(motion.modes.T):
         if mode == SWINGING:
             continue
-        first, last = motion.contact[start, leg], motion.contact[stop - 1, leg]
-        region = motion.terrain.region_at(*first[:2])
-        normal = [0.0, 0.0, 1.0] if region is None else motion.terrain.regions[region].normal
-        node = visualizer["prints"][f"{LEGS[leg]} {count}"]
-        scene.add_print(node, first, last if mode == 1 else first, normal, MODE_COLOURS[mode])
+        path = motion.contact[start:stop, leg]
+        regions = [terrain.region_at(*point[:2]) for point in path]
+        kinks = [i for i in range(1, len(path)) if regions[i] != regions[i - 1]] if mode == 1 else []
+        for first, after in itertools.pairwise([0, *kinks, len(path)]):
+            region = regions[first]
+            normal = [0.0, 0.0, 1.0] if region is None else terrain.regions[region].normal
+            last = path[after - 1] if mode == 1 else path[first]
+            node = visualizer["prints"][f"{LEGS[leg]} {count}"]
+            scene.add_print(node, path[first], last, normal, MODE_COLOURS[mode])
+            count += 1

@@ -10,6 +10,9 @@ from wfbook.view.style import BODY, FOOT, INK, WHEEL, hex_to_int
 
 _TILE = 0.25
 _TILE_COLOURS = ("#FAFAFA", "#E9E9E9")
+_SKIRT_COLOUR = "#B4BAC2"
+_SKIRT = 0.06
+"""Depth of the sides that a region shows where the ground ends or bends."""
 _GLOW = 0.3
 """How much of an end effector's colour survives in the robot's own shade."""
 _COLLISION_GROUP = 3
@@ -186,7 +189,10 @@ class _Sun(g.Object):
 
 
 def add_terrain(visualizer: Visualizer, terrain: Terrain, low: np.ndarray, high: np.ndarray) -> None:
-    """Draw the regions as a chequerboard of 25 cm tiles, cut off at the box from low (2,) to high (2,)."""
+    """Draw the regions as a chequerboard of 25 cm tiles, cut off at the box from low (2,) to high (2,).
+
+    Several regions have outlines and sides: one sees where the ground bends, and where there is none.
+    """
     cells_low = np.floor(low / _TILE).astype(int)
     cells_high = np.ceil(high / _TILE).astype(int)
     for shade, colour in enumerate(_TILE_COLOURS):
@@ -207,6 +213,28 @@ def add_terrain(visualizer: Visualizer, terrain: Terrain, low: np.ndarray, high:
         if faces:
             node = visualizer["terrain"][f"tiles{shade}"]
             node.set_object(g.TriangularMeshGeometry(vertices, faces), material(colour))
+    if len(terrain.regions) > 1:
+        _add_sides(visualizer["terrain"], terrain, low, high)
+
+
+def _add_sides(node: Visualizer, terrain: Terrain, low: np.ndarray, high: np.ndarray) -> None:
+    """Draw a line round every region and the sides below it."""
+    vertices: list[np.ndarray] = []
+    faces: list[tuple[int, int, int]] = []
+    for index, region in enumerate(terrain.regions):
+        outline = clip(region.vertices[:, :2], low, high)
+        if not len(outline):
+            continue
+        rim = np.array([[x, y, region.height(x, y)] for x, y in outline])
+        loop = np.vstack([rim, rim[:1]]) + np.array([0.0, 0.0, 0.001])
+        add_line(node[f"outline{index}"], loop, _SKIRT_COLOUR)
+        start, n = len(vertices), len(rim)
+        vertices += [*rim, *(rim - np.array([0.0, 0.0, _SKIRT]))]
+        for k in range(n):
+            a, b = start + k, start + (k + 1) % n
+            faces += [(a, a + n, b), (b, a + n, b + n)]
+    if faces:
+        node["sides"].set_object(g.TriangularMeshGeometry(vertices, faces), material(_SKIRT_COLOUR))
 
 
 def clip(polygon: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
