@@ -15,7 +15,8 @@ import numpy as np
 _TOLERANCE = 5e-5
 """Of the cost: what the node QP's rough solver may be wrong by; divided by the multiplier, in metres."""
 
-_PROBES = 2
+PROBES = 2
+"""How many multipliers are tried for each bound."""
 
 
 @dataclass(frozen=True)
@@ -48,24 +49,16 @@ class MotionBounds:
 def tightened(
     bounds: MotionBounds,
     quantities: dict[str, np.ndarray],
-    minimise: Callable[[np.ndarray], tuple[float, float]],
-    base: float,
-    cutoff: float,
+    least_of: Callable[[list[np.ndarray]], list[float]],
     stop: Callable[[], bool],
 ) -> MotionBounds:
     """Narrow ranges to what plans cheaper than a cutoff can have.
-
-    For any multiplier μ > 0 and a linear quantity ℓ, ``min (cost + μ ℓ) = q`` implies ``ℓ ≥ (q − U)/μ`` on
-    every plan that costs at most U. The best μ is where the minimiser costs just U.
 
     Args:
         bounds: to begin with.
         quantities: by name of a field, rows ``(J, n)`` of linear functions of the QP's variables (for
             ``place`` those of x).
-        minimise: adds a linear cost to the QP; returns a lower bound of its optimum and the minimiser's
-            value of that linear cost.
-        base: lower bound of the QP's optimum.
-        cutoff: U.
+        least_of: lower bounds of such functions over all those plans, as :func:`least` finds them.
         stop: asked now and then; once true, the rest stays as it is.
     """
     changed = {}
@@ -75,19 +68,29 @@ def tightened(
         for j, row in enumerate(rows):
             if stop():
                 break
-            for side, sign in ((0, 1.0), (1, -1.0)):
-                limit = sign * _least(sign * row, minimise, base, cutoff)
-                view[side, j] = max(view[side, j], limit) if side == 0 else min(view[side, j], limit)
+            low, high = least_of([row, -row])
+            view[0, j], view[1, j] = max(view[0, j], low), min(view[1, j], -high)
         changed[name] = ranges
     return replace(bounds, **changed)
 
 
-def _least(
+def least(
     row: np.ndarray, minimise: Callable[[np.ndarray], tuple[float, float]], base: float, cutoff: float
 ) -> float:
-    """Return a lower bound of a linear function over all points of cost below the cutoff."""
+    """Return a lower bound of a linear function over all points of cost below a cutoff.
+
+    For any multiplier μ > 0 and a linear quantity ℓ, ``min (cost + μ ℓ) = q`` implies ``ℓ ≥ (q − U)/μ`` on
+    every plan that costs at most U. The best μ is where the minimiser costs just U.
+
+    Args:
+        row: coefficients of the function.
+        minimise: adds a linear cost to the QP; returns a lower bound of its optimum and the minimiser's
+            value of that linear cost.
+        base: lower bound of the QP's optimum.
+        cutoff: U.
+    """
     best, multiplier = -np.inf, max(cutoff - base, 1e-6) / 0.1
-    for _ in range(_PROBES):
+    for _ in range(PROBES):
         value, part = minimise(multiplier * row)
         if not np.isfinite(value):
             break

@@ -138,13 +138,8 @@ class Boxes:
         start = np.array([[int(e == "wheel")] for e in self.problem.start_end_effectors])
         low = np.hstack([start, lower[layout.wheel]])
         up = np.hstack([start, upper[layout.wheel]])
-        for j in range(self.problem.slots):
-            keeps = S_up[:, j] == 0
-            for at, other in ((j + 1, j), (j, j + 1)):
-                low[keeps, at] = np.maximum(low[keeps, at], low[keeps, other])
-                up[keeps, at] = np.minimum(up[keeps, at], up[keeps, other])
-            changes = (low[:, j] > up[:, j + 1]) | (up[:, j] < low[:, j + 1])
-            S_low[changes, j] = 1
+        low, up = _kept(low, up, S_up == 0)
+        S_low |= (low[:, :-1] > up[:, 1:]) | (up[:, :-1] < low[:, 1:])
         if (low > up).any() or (self.problem.final_stance and low[:, -1].all()):
             return False
         lower[layout.wheel], upper[layout.wheel] = low[:, 1:], up[:, 1:]
@@ -161,24 +156,20 @@ class Boxes:
         fixed = np.ones_like(S_up, bool)
         if problem.wheels and problem.ground.rolls_over_edges:
             fixed = upper[layout.wheel] == 0
-        for j in range(problem.slots):
-            stays = (S_up[:, j] == 0) & fixed[:, j]
-            for at, other in ((j + 1, j), (j, j + 1)):
-                low[:, stays, at] = np.maximum(low[:, stays, at], low[:, stays, other])
-                up[:, stays, at] = np.minimum(up[:, stays, at], up[:, stays, other])
-            moved = (low[:, :, j] > up[:, :, j + 1]) | (up[:, :, j] < low[:, :, j + 1])
-            S_low[moved.any(axis=0) & fixed[:, j], j] = 1
+        low, up = _kept(low, up, (S_up == 0) & fixed)
+        moved = (low[..., :-1] > up[..., 1:]) | (up[..., :-1] < low[..., 1:])
+        S_low |= moved.any(axis=0) & fixed
         if (low > up).any():
             return False
         # What is left of each ladder must hold a region in reach, and a rolling wheel's must share a group.
         first, last = low.sum(axis=0), up.sum(axis=0)
-        for leg, j in zip(*np.nonzero(first[:, 1:] == last[:, 1:]), strict=True):
-            here = first[leg, j + 1]
-            if not self._reachable[here, leg, j]:
-                return False
-            known = first[leg, j] == last[leg, j]
-            if S_up[leg, j] == 0 and known and self._group[here] != self._group[first[leg, j]]:
-                return False
+        known = first == last
+        legs, slots = np.ogrid[: S_up.shape[0], : S_up.shape[1]]
+        here, before = first[:, 1:], first[:, :-1]
+        unreachable = ~self._reachable[here, legs, slots]
+        torn = (S_up == 0) & known[:, :-1] & (self._group[here] != self._group[before])
+        if (known[:, 1:] & (unreachable | torn)).any():
+            return False
         lower[layout.G], upper[layout.G] = low[:, :, 1:], up[:, :, 1:]
         return True
 
@@ -248,18 +239,38 @@ class Boxes:
         )
 
 
+def _kept(low: np.ndarray, up: np.ndarray, keeps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Narrow binaries that don't change over some slots, to what all entries of such a stretch allow.
+
+    Args:
+        low: ``(…, L, J+1)`` lower bounds, 0 or 1, before the first slot and after each.
+        up: upper bounds, likewise.
+        keeps: ``(L, J)`` whether nothing changes during a slot.
+    """
+    stretch = np.zeros((len(keeps), keeps.shape[1] + 1), int)
+    np.cumsum(~keeps, axis=1, out=stretch[:, 1:])
+
+    def most(values: np.ndarray) -> np.ndarray:
+        # Twice the number of the stretch keeps a running maximum from leaving its stretch.
+        ahead = np.maximum.accumulate(values + 2 * stretch, axis=-1) - 2 * stretch
+        back = (ahead - 2 * stretch)[..., ::-1]
+        return np.maximum.accumulate(back, axis=-1)[..., ::-1] + 2 * stretch
+
+    return most(low), 1 - most(1 - up)
+
+
 def _narrow_sums(S_low: np.ndarray, S_up: np.ndarray, C_low: np.ndarray, C_up: np.ndarray) -> None:
     """Propagate ``C[:, j] = C[:, j−1] + S[:, j]`` forward, backward and into S, in place."""
-    J = S_low.shape[1]
-    zero = np.zeros(len(S_low), int)
-    for j in range(J):
-        low, up = (C_low[:, j - 1], C_up[:, j - 1]) if j else (zero, zero)
-        np.maximum(C_low[:, j], low + S_low[:, j], out=C_low[:, j])
-        np.minimum(C_up[:, j], up + S_up[:, j], out=C_up[:, j])
-    for j in range(J - 1, -1, -1):
-        low, up = (C_low[:, j - 1], C_up[:, j - 1]) if j else (zero, zero)
-        np.maximum(S_low[:, j], C_low[:, j] - up, out=S_low[:, j])
-        np.minimum(S_up[:, j], C_up[:, j] - low, out=S_up[:, j])
-        if j:
-            np.maximum(C_low[:, j - 1], C_low[:, j] - S_up[:, j], out=C_low[:, j - 1])
-            np.minimum(C_up[:, j - 1], C_up[:, j] - S_low[:, j], out=C_up[:, j - 1])
+    least, most = np.cumsum(S_low, axis=1), np.cumsum(S_up, axis=1)
+    # What the sum is above its least, and below its most, can only grow; both begin at zero.
+    above = np.maximum.accumulate(np.maximum(C_low - least, 0), axis=1)
+    below = np.maximum.accumulate(np.maximum(most - C_up, 0), axis=1)
+    np.maximum(C_low, least + above, out=C_low)
+    np.minimum(C_up, most - below, out=C_up)
+    # Backward: a later sum less all swings that may come until then.
+    np.maximum(C_low, most + np.maximum.accumulate((C_low - most)[:, ::-1], axis=1)[:, ::-1], out=C_low)
+    np.minimum(C_up, least + np.minimum.accumulate((C_up - least)[:, ::-1], axis=1)[:, ::-1], out=C_up)
+    before_low, before_up = np.zeros_like(C_low), np.zeros_like(C_up)
+    before_low[:, 1:], before_up[:, 1:] = C_low[:, :-1], C_up[:, :-1]
+    np.maximum(S_low, C_low - before_up, out=S_low)
+    np.minimum(S_up, C_up - before_low, out=S_up)

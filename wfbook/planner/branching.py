@@ -51,10 +51,10 @@ class Branching:
             candidates = candidates[~on_the_way]
         score = self._score(candidates, z)
         order = candidates[np.argsort(-score, kind="stable")]
-        best, best_children, best_gain = None, [], -1.0
+        best_children, best_gain = [], -1.0
         for tried, index in enumerate(order[: 3 * _STRONG]):
             reliable = self._seen[:, index].min() >= _RELIABLE
-            if best is not None and (tried >= _STRONG or (reliable and tried >= 2)):
+            if tried >= _STRONG or (reliable and tried >= 2):
                 break
             children = self._children(lower, upper, index, z[index])
             self.kernel.bound_both(children, cutoff)
@@ -66,7 +66,7 @@ class Branching:
                 return alive
             gain = max(gains[0], 1e-6) * max(gains[1], 1e-6)
             if gain > best_gain:
-                best, best_children, best_gain = index, alive, gain
+                best_children, best_gain = alive, gain
         return best_children
 
     def _score(self, candidates: np.ndarray, z: np.ndarray) -> np.ndarray:

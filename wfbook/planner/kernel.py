@@ -12,7 +12,7 @@ import numpy as np
 from scipy import sparse
 
 from wfbook.planner import relaxation, tight
-from wfbook.planner.bounds import MotionBounds, tightened
+from wfbook.planner.bounds import PROBES, MotionBounds, least, tightened
 from wfbook.planner.boxes import Boxes
 from wfbook.planner.conic import Boxed, Conic, Solution
 from wfbook.planner.contacts import assignment
@@ -131,13 +131,17 @@ class Kernel:
             quantities["travel"] = rows(ends[:, None], begins[:, None])
             quantities["drift"] = rows(self._x[1:].reshape(-1, rho), begins[:, None])
 
-        def minimise(linear: np.ndarray) -> tuple[float, float]:
-            self.qps += 1
-            return self._qp.minimise(*(side.astype(float) for side in root), linear)
+        def least_of(rows: list[np.ndarray]) -> list[float]:
+            self.qps += PROBES * len(rows)
+            return self._shared(self._least, [(row, base, cutoff) for row in rows])
 
-        self._bound_within(tightened(self._anywhere, quantities, minimise, base, cutoff, stop))
+        self._bound_within(tightened(self._anywhere, quantities, least_of, stop))
         self.boxes = Boxes(self.problem, Places.of(self.problem, self.motion).reachable)
         self.pruned = min(self.pruned, cutoff)
+
+    def _least(self, row: np.ndarray, base: float, cutoff: float) -> float:
+        lower, upper = (side.astype(float) for side in self.boxes.root())
+        return least(row, lambda linear: self._qp.minimise(lower, upper, linear), base, cutoff)
 
     def relax(self) -> None:
         """Take back what :meth:`tighten` did."""

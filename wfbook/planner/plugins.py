@@ -76,12 +76,13 @@ class Split(Branchrule):
         children = self._branching.split(*box, found, tree.cutoff)
         if not children:
             return {"result": SCIP_RESULT.CUTOFF}
+        before = tree.box()
         for lower, upper in children:
             bound = max(kernel.bound(lower, upper).bound, found.bound)
             node = tree.model.createChild(0.0, bound)
             tree.model.updateNodeLowerbound(node, max(bound, tree.root_bound))
             for variable, was_low, was_up, low, up in zip(
-                tree.variables, *tree.box(), lower, upper, strict=True
+                tree.variables, *before, lower, upper, strict=True
             ):
                 if low > was_low:
                     tree.model.chgVarLbNode(node, variable, float(low))
