@@ -79,6 +79,7 @@ def test_narrowed_ranges_hold_all_that_is_cheap_in_spite_of_a_rough_solver(seed)
         return value + rng.uniform(-1, 1) * 1e-5, -0.5 * linear @ inverse @ linear
 
     wide = replace(MotionBounds.of(p), travel=np.array([[-9.0] * 3, [9.0] * 3]))
+
     def least_of(rows):
         return [least(row, minimise, 0.0, cutoff) for row in rows]
 

@@ -81,9 +81,7 @@ class Split(Branchrule):
             bound = max(kernel.bound(lower, upper).bound, found.bound)
             node = tree.model.createChild(0.0, bound)
             tree.model.updateNodeLowerbound(node, max(bound, tree.root_bound))
-            for variable, was_low, was_up, low, up in zip(
-                tree.variables, *before, lower, upper, strict=True
-            ):
+            for variable, was_low, was_up, low, up in zip(tree.variables, *before, lower, upper, strict=True):
                 if low > was_low:
                     tree.model.chgVarLbNode(node, variable, float(low))
                 if up < was_up:
