@@ -12,7 +12,9 @@ from wfbook.planner.symmetry import MIRROR, mirror_symmetric
 TROT = ((0, 3), (1, 2))
 CRAWL = ((2,), (0,), (3,), (1,))
 
-_EXACT = 2  # gaits solved exactly in each round of the local search
+_EXACT = 2  # gaits solved exactly at once
+_SEVERAL = 6  # of them in a round of the local search, where the choice of regions may lead nowhere
+_TEMPLATES = 16  # templates that may be tried before one is feasible
 _ROUNDS = 10
 _DIVES = 400  # relaxations that a dive may take
 _BATCH = 8  # gaits bounded between two looks at the clock
@@ -58,7 +60,10 @@ def templates(problem: Problem) -> Iterator[Gait]:
 
 
 def neighbours(problem: Problem, gait: Gait) -> Iterator[Gait]:
-    """Yield gaits one small change away: drop or shift a swing, change what it lands on; regions open."""
+    """Yield gaits one small change away: drop, shift or add a swing, change what it lands on.
+
+    Their regions are open.
+    """
     S, wheel, _ = gait
     L, J = S.shape
     landed = [[(j, wheel[leg, j]) for j in np.flatnonzero(S[leg])] for leg in range(L)]
@@ -75,6 +80,11 @@ def neighbours(problem: Problem, gait: Gait) -> Iterator[Gait]:
         # A push: down on the foot, and two slots later on the wheel again.
         if j + 2 < J and not S[leg, j : j + 3].any():
             yield _with(problem, gait, leg, sorted([*landed[leg], (j, 0), (j + 2, 1)]))
+    if problem.ground.count > 1:  # another step, where one is too short for the ground
+        for leg, j in np.argwhere(S == 0):
+            near = S[leg, max(j - 1, 0) : j + 2].any() and problem.stance_between_swings
+            if not near and not (j == J - 1 and problem.final_stance):
+                yield _with(problem, gait, leg, sorted([*landed[leg], (j, wheel[leg, j])]))
     for pair in ((0, 3), (1, 2)):
         for j in range(J):
             if S[pair[0], j] and S[pair[1], j]:
@@ -141,23 +151,39 @@ def improve(
         order = sorted(range(len(bounds)), key=lambda i: (bounds[i], i))
         return [fresh[i] for i in order if bounds[i] < below]
 
-    best, current = np.inf, None
-    for turn in range(_ROUNDS + 1):
-        if turn == 0:
-            tried = [gait for gait in known if kernel.boxes.admissible(gait)]
-        else:
-            candidates = templates(problem) if turn == 1 else neighbours(problem, current)
-            tried = [g for g in kernel.complete(ranked(candidates, best)[:_EXACT]) if g is not None]
-        costs = kernel.price(tried, best, quick=True)
-        if turn == 1 and current is None and not np.isfinite(min(costs, default=np.inf)):
-            tried = list(dive(kernel, stop))
-            costs = kernel.price(tried, quick=True)
-        if costs and min(costs) < best:
-            best, current = min(costs), tried[int(np.argmin(costs))]
+    def first_below(gaits: list[Gait], below: float) -> tuple[float, Gait | None]:
+        """Return the cheapest of the first few gaits, regions open, that cost less; None if none does."""
+        for i in range(0, len(gaits), _EXACT):
+            if stop():
+                break
+            tried = [gait for gait in kernel.complete(gaits[i : i + _EXACT]) if gait is not None]
+            costs = kernel.price(tried, below, quick=True)
+            if min(costs, default=np.inf) < below:
+                return min(costs), tried[int(np.argmin(costs))]
+        return np.inf, None
+
+    costs = kernel.price(begin := [gait for gait in known if kernel.boxes.admissible(gait)], quick=True)
+    best, current = min(costs, default=np.inf), None
+    if np.isfinite(best):
+        current = begin[int(np.argmin(costs))]
+        yield best, current
+    # Where common gaits miss the ground, that of the lowest bound is seldom the first to find it.
+    many = _EXACT if problem.ground.count == 1 else _SEVERAL
+    tries = _TEMPLATES if current is None else many
+    cost, found = first_below(ranked(templates(problem), best)[:tries], best)
+    if found is None and current is None and not stop():
+        found = next(dive(kernel, stop), None)
+        cost = kernel.price([found], quick=True)[0] if found else np.inf
+    for _ in range(_ROUNDS):
+        if found is not None:
+            best, current = cost, found
             yield best, current
-        elif turn > 1 or (turn == 1 and current is None):
+        elif current is None:
             return
         if stop():
+            return
+        cost, found = first_below(ranked(neighbours(problem, current), best)[:many], best)
+        if found is None:
             return
 
 
