@@ -6,7 +6,8 @@ same holds for a wheel at an edge beyond which its group does not go on. Beside 
 for the foot itself, and in front of one for the calf, which slants back.
 
 **Grip.** A plan may use all friction there is (eqs 26 and 27), and in the corners of the pyramid more. Then
-nothing is left to correct an error with, and the foot slides.
+nothing is left to correct an error with, and the foot slides. At rest there is no choice of when to push:
+there a share of the friction must suffice, whatever it costs.
 """
 
 from collections.abc import Iterator
@@ -28,6 +29,9 @@ CALF = 2.0
 
 GRIP = 0.65
 """Share of the friction coefficients that forces keep to; the corners of this pyramid are in the cone."""
+
+HOLD = 0.85
+"""Share of the friction coefficients that must be enough to stay at rest."""
 
 _BEYOND = 2e-3
 _STEP = 5e-3
@@ -60,20 +64,47 @@ def kept_off(problem: Problem, gait: Gait) -> Iterator[Edge]:
 
 
 def kept_in_grip(problem: Problem, gait: Gait) -> Iterator[tuple[int, int, np.ndarray]]:
-    """Yield the sides of smaller friction pyramids: intervals' indices, leg, and ``c`` with ``c · λ ≤ 0``.
+    """Yield the sides of smaller friction pyramids: an interval, leg, and ``c`` with ``c · λ ≤ 0``.
+
+    Interval K is the rest after the plan, where that ends at rest.
 
     A wheel that rolls over an edge within a slot is taken to be on the region on which it ends.
     """
     for leg, slot in np.argwhere(gait.S == 0):
-        region = problem.terrain.regions[int(gait.region[leg, slot])]
-        if gait.wheel[leg, slot]:
-            sides = [(region.binormal, region.mu_wheel_lateral)]
-        else:
-            sides = [(region.tangent, region.mu_foot), (region.binormal, region.mu_foot)]
-        for direction, mu in sides:
-            for sign in (1.0, -1.0):
-                for k in range(problem.knots_per_slot * slot, problem.knots_per_slot * (slot + 1)):
-                    yield k, int(leg), sign * direction - GRIP * mu * region.normal
+        intervals = list(range(problem.knots_per_slot * slot, problem.knots_per_slot * (slot + 1)))
+        if slot == problem.slots - 1 and problem.final_stance:
+            intervals.append(problem.knots)
+        for side in _sides(problem, gait, leg, slot, GRIP):
+            for k in intervals:
+                yield k, int(leg), side
+
+
+def held_at_rest(problem: Problem, gait: Gait) -> Iterator[tuple[int, np.ndarray, float]]:
+    """Yield what must hold of the forces at rest: leg, and ``c · F ≤ most`` in body weights.
+
+    Nothing for a plan that does not end at rest.
+    """
+    for leg in range(problem.legs) if problem.final_stance else ():
+        region = problem.terrain.regions[int(gait.region[leg, -1])]
+        yield leg, -region.normal, 0.0
+        yield leg, region.normal, problem.limits.force
+        for side in _sides(problem, gait, leg, -1, HOLD):
+            yield leg, side, 0.0
+        if gait.wheel[leg, -1]:  # a free wheel holds nothing along t
+            yield leg, region.tangent, 0.0
+            yield leg, -region.tangent, 0.0
+
+
+def _sides(problem: Problem, gait: Gait, leg: int, slot: int, share: float) -> Iterator[np.ndarray]:
+    """Yield the sides ``c`` of a pyramid of a share of the friction: ``c · λ ≤ 0``."""
+    region = problem.terrain.regions[int(gait.region[leg, slot])]
+    if gait.wheel[leg, slot]:
+        sides = [(region.binormal, region.mu_wheel_lateral)]
+    else:
+        sides = [(region.tangent, region.mu_foot), (region.binormal, region.mu_foot)]
+    for direction, mu in sides:
+        for sign in (1.0, -1.0):
+            yield sign * direction - share * mu * region.normal
 
 
 def _goes_on(problem: Problem, region: int, edge: int) -> bool:

@@ -5,6 +5,10 @@ from it fall. With the binaries fixed, the only non-convexity left is the produc
 It is linearised about the last plan, inside a trust region; a few small QPs bring the true torque of
 eq. 8 into agreement with the rotation. What comes out adds the sideways sway that the relaxed plan
 did without, and keeps its distance from edges and from the limits of friction (:mod:`.margins`).
+
+A plan that ends at rest must also stay there. The program does not see to that: on a slope its last
+interval brakes, uphill with less traction than holding takes. So the polish has one more row of levers and
+forces, those at rest: they carry the weight, turn nothing and keep to friction.
 """
 
 from dataclasses import replace
@@ -20,11 +24,11 @@ from wfbook.planner.contacts import assignment
 from wfbook.planner.crossings import Crossings, settle
 from wfbook.planner.extract import fill, gait_of, plan_of, problem_of, read
 from wfbook.planner.gait import Gait
-from wfbook.planner.margins import kept_in_grip, kept_off
+from wfbook.planner.margins import held_at_rest, kept_in_grip, kept_off
 from wfbook.planner.plan import Plan
 from wfbook.planner.presolve import solve_fixed
 from wfbook.planner.problem import Problem
-from wfbook.planner.program import motion_cost
+from wfbook.planner.program import levers, motion_cost
 
 ANGLE_WEIGHTS = {"goal_angle": 100.0, "angle": 20.0, "angular_rate": 1.0}
 """Weights of rotation while polishing: the true torque is to be spent on staying level."""
@@ -49,6 +53,9 @@ ACCEPTED_NM = 0.1
 
 _ITERATIONS = 20
 
+_WEIGHT = (0.0, 0.0, 1.0)
+"""What the contacts carry at rest, in body weights."""
+
 
 class Polisher:
     """The QP of the polish for one problem, compiled once and used for any of its gaits."""
@@ -57,12 +64,17 @@ class Polisher:
         """Compile the tight program without eq. 9, with levers, forces and slack as variables."""
         self.problem = replace(problem, weights=replace(problem.weights, **ANGLE_WEIGHTS))
         self.program = program = tight.build(self.problem)
-        shape = (problem.knots, problem.legs)
+        K = problem.knots
+        rows = K + problem.final_stance  # the last one at rest
+        shape = (rows, problem.legs)
         self._lever = [cp.Variable(shape) for _ in range(3)]
         self._force = [cp.Variable(shape) for _ in range(3)]
-        self._slack = [cp.Variable(problem.knots) for _ in range(3)]
-        ties = [v == e for v, e in zip(self._lever, program.lever, strict=True)]
-        ties += [v == e for v, e in zip(self._force, program.force, strict=True)]
+        self._slack = [cp.Variable(rows) for _ in range(3)]
+        ties = [v[:K] == e for v, e in zip(self._lever, program.lever, strict=True)]
+        ties += [v[:K] == e for v, e in zip(self._force, program.force, strict=True)]
+        if problem.final_stance:
+            ties += [v[K] == r[K] for v, r in zip(self._lever, levers(program), strict=True)]
+            ties += [cp.sum(v[K]) == carried for v, carried in zip(self._force, _WEIGHT, strict=True)]
         squares = sum(cp.sum_squares(z) for z in (*self._lever, *self._force))
         cost = motion_cost(program) + 4 * problem.weights.bounds * squares
         cost += PRICE * sum(cp.norm1(s) for s in self._slack)
@@ -83,7 +95,9 @@ class Polisher:
 
         Returns:
             The polished plan. ``meta["torque_mismatch_nm"]`` holds the rms per axis of what is left,
-            ``meta["relaxed_torque_mismatch_nm"]`` that of the relaxed plan; :func:`repaired` judges.
+            ``meta["relaxed_torque_mismatch_nm"]`` that of the relaxed plan, and
+            ``meta["rest_mismatch_nm"]``, where the plan ends at rest, the torque that it lacks to stay there;
+            :func:`repaired` judges.
         """
         weight, conic = self.problem.robot.weight, self._conic
         gait = gait_of(plan)
@@ -91,6 +105,11 @@ class Polisher:
         margins = self._margins(gait)
         lever = list(np.moveaxis(plan.middle_lever, -1, 0))
         force = [plan.lam[..., i] / weight for i in range(3)]
+        if self.problem.final_stance:
+            away = (plan.p[-1] - plan.x[-1]).T
+            lever = [np.vstack([r, last]) for r, last in zip(lever, away, strict=True)]
+            even = np.outer(_WEIGHT, np.full(self.problem.legs, 1.0 / self.problem.legs))
+            force = [np.vstack([F, share]) for F, share in zip(force, even, strict=True)]
         radius, best, merit, steps = np.array([0.05, 0.25]), None, np.inf, 0
         cost = np.inf
         while steps < _ITERATIONS:
@@ -163,6 +182,10 @@ class Polisher:
             columns.append([*force[:, k, leg], slip[k, leg]])
             entries.append([*c, -1.0])
             right.append(0.0)
+        for leg, c, most in held_at_rest(problem, gait):
+            columns.append(force[:, problem.knots, leg])
+            entries.append(c)
+            right.append(most)
         rows = np.repeat(np.arange(len(columns)), [len(c) for c in columns])
         shape = len(columns), conic.A.shape[1]
         where = rows, np.concatenate(columns)
@@ -177,7 +200,7 @@ class Polisher:
     ) -> Conic:
         """Return the QP with eq. 8 linearised about a plan, inside a trust region and with margins."""
         conic, problem = self._conic, self.problem
-        n, K = conic.A.shape[1], problem.knots
+        n, K = conic.A.shape[1], len(lever[0])
         inertia = problem.robot.inertia / problem.robot.weight
         r, F, s, alpha = (
             [conic.columns(v) for v in group]
@@ -187,9 +210,8 @@ class Polisher:
         knots = np.arange(K)
 
         def put(axis: int, where: np.ndarray, what: np.ndarray) -> None:
-            at = np.broadcast_to(
-                (axis * K + knots)[:, None] if where.ndim == 2 else axis * K + knots, where.shape
-            )
+            at = axis * K + knots[: len(where)]
+            at = np.broadcast_to(at[:, None] if where.ndim == 2 else at, where.shape)
             (
                 rows.append(at.ravel()),
                 columns.append(where.ravel()),
@@ -215,11 +237,17 @@ class Polisher:
         return conic.with_rows(equal, np.concatenate(right), below, limit)
 
     def _mismatch(self, lever: list[np.ndarray], force: list[np.ndarray], y: np.ndarray) -> np.ndarray:
-        """Return rotation minus true torque (eq. 8), in body weights times metres, ``(3, K)``."""
+        """Return rotation minus true torque (eq. 8), in body weights times metres.
+
+        Returns:
+            ``(3, K)``, or ``(3, K+1)`` with the torque at rest as the last.
+        """
         problem = self.problem
-        alpha = np.array([self._conic.value(a, y) for a in self.program.alpha])
         torque = np.array([tau.sum(axis=1) for tau in contact_torque(lever, force)])
-        return problem.robot.inertia @ alpha / problem.robot.weight - torque
+        mismatch = -torque
+        alpha = np.array([self._conic.value(a, y) for a in self.program.alpha])
+        mismatch[:, : problem.knots] += problem.robot.inertia @ alpha / problem.robot.weight
+        return mismatch
 
     def _plan(self, plan: Plan, y: np.ndarray, steps: int) -> Plan:
         fill(self.program, self._conic, y)
@@ -228,6 +256,10 @@ class Polisher:
         # The weights of the record are those of the program that chose the gait.
         problem = replace(self.problem, weights=problem_of(plan).weights)
         polished = plan_of(problem, values, gait_of(plan), meta)
+        if problem.final_stance:
+            lever, force = ([self._conic.value(v, y) for v in part] for part in (self._lever, self._force))
+            at_rest = problem.robot.weight * self._mismatch(lever, force, y)[:, -1]
+            polished = polished.with_meta(rest_mismatch_nm=np.abs(at_rest).tolist())
         return polished.with_meta(
             torque_mismatch_nm=torque_mismatch(polished).tolist(),
             relaxed_torque_mismatch_nm=torque_mismatch(plan).tolist(),
@@ -263,8 +295,9 @@ def torque_mismatch(plan: Plan) -> np.ndarray:
 
 
 def repaired(plan: Plan) -> bool:
-    """Tell whether a polished plan's torque is true to 0.1 N m rms on every axis."""
-    return bool(np.max(plan.meta["torque_mismatch_nm"]) <= ACCEPTED_NM)
+    """Tell whether a polished plan's torque is true to 0.1 N m on every axis, rms and at rest."""
+    left = [*plan.meta["torque_mismatch_nm"], *plan.meta.get("rest_mismatch_nm", [])]
+    return bool(np.max(left) <= ACCEPTED_NM)
 
 
 def _farthest(new: list[np.ndarray], old: list[np.ndarray]) -> float:
