@@ -92,7 +92,6 @@ def test_the_answer_obeys_the_physics(robot, ground, mode, seed):
 
 
 def test_osqp_and_an_exact_solver_agree_in_closed_loop(monkeypatch):
-    pytest.importorskip("daqp")
     seen = []
     solve = QuadraticProgram.solve
 

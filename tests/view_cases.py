@@ -83,9 +83,8 @@ def small_run(settle: float = 0.1, shift: float = 0.003) -> Run:
             contact_force=plan.lam[knot],
         ),
         **dict(in_contact=stance, end_effector=kind.astype(np.int8), stance=stance, com_ref=com_ref),
-        **dict(com_velocity_ref=0 * com, p_ref=p_ref, tick_ms=np.ones(N), metrics={}, meta={}),
+        **dict(com_velocity_ref=0 * com, p_ref=p_ref, solved=np.ones(N, bool), metrics={}, meta={}),
         **dict(base_estimate=qpos[:, :7], base_velocity_estimate=np.zeros((N, 6)), com_estimate=com),
-        estimator_ms=np.zeros(N),
         terrain=plan.terrain,
         joint_names=[],
     )

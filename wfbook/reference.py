@@ -17,6 +17,9 @@ class Gains:
         com_kp, com_kd: ``(3,)`` of the centre of mass.
         attitude_kp, attitude_kd: ``(3,)`` of the trunk's orientation. They are high because dry friction in
             the joints acts on the attitude most.
+        attitude_ki: ``(3,)`` gain on the integral of its error.
+        most_integral: the largest angular acceleration that the integral may ask for, rad/s².
+        integral_fade: time in which it fades on two legs, in seconds.
         wheel_kp, wheel_kd: of a rolling wheel's place below the robot.
         swing_kp, swing_kd: of a swinging leg's end.
         com_weight, attitude_weight, wheel_weight, swing_weight: of the tasks in eq. 38. On two legs
@@ -31,14 +34,17 @@ class Gains:
 
     com_kp: np.ndarray = field(default_factory=lambda: np.array([200.0, 200.0, 400.0]))
     com_kd: np.ndarray = field(default_factory=lambda: np.array([28.0, 28.0, 40.0]))
-    attitude_kp: np.ndarray = field(default_factory=lambda: np.array([560.0, 560.0, 400.0]))
-    attitude_kd: np.ndarray = field(default_factory=lambda: np.array([47.0, 47.0, 40.0]))
+    attitude_kp: np.ndarray = field(default_factory=lambda: np.array([900.0, 900.0, 400.0]))
+    attitude_kd: np.ndarray = field(default_factory=lambda: np.array([60.0, 60.0, 40.0]))
+    attitude_ki: np.ndarray = field(default_factory=lambda: np.array([8000.0, 8000.0, 0.0]))
+    most_integral: float = 20.0
+    integral_fade: float = 0.3
     wheel_kp: float = 150.0
     wheel_kd: float = 24.0
     swing_kp: float = 400.0
     swing_kd: float = 40.0
     com_weight: float = 1000.0
-    attitude_weight: float = 3.0
+    attitude_weight: float = 5.0
     wheel_weight: float = 30.0
     swing_weight: float = 10.0
     contact_damping: float = 40.0
@@ -101,6 +107,7 @@ class Reference:
         wheels: ``(4,)`` bool, which legs stand, or would, on their wheel.
         forces: ``(4, 3)`` forces towards which λ is regularised.
         omega: ``(3,)`` angular velocity of the trunk; by default it is to rest.
+        angular_acceleration: ``(3,)`` of the trunk, besides what its error asks for.
     """
 
     com: np.ndarray
@@ -114,3 +121,4 @@ class Reference:
     wheels: np.ndarray
     forces: np.ndarray
     omega: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    angular_acceleration: np.ndarray = field(default_factory=lambda: np.zeros(3))

@@ -1,7 +1,7 @@
 """What a simulation leaves behind: the log of a run, its file, and its figures of merit."""
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
@@ -15,8 +15,11 @@ from wfbook.tracking import Swing
 if TYPE_CHECKING:
     from wfbook.planner.plan import Plan
 
-FORMAT = 3
+FORMAT = 4
 """Version of the run file; a file of another version is refused."""
+
+TIMINGS = ("solve_time_s", "estimator_ms_median", "tick_ms_median", "tick_ms_p99", "real_time_factor")
+"""Metrics that differ from run to run of one seed; they are not in the run file, which does not."""
 
 
 @dataclass(frozen=True)
@@ -47,12 +50,14 @@ class Run:
         base_estimate: ``(N, 7)`` estimate of ``qpos[:, :7]``; the truth if the controller saw it.
         base_velocity_estimate: ``(N, 6)`` estimate of ``qvel[:, :6]``.
         com_estimate: ``(N, 3)`` estimate of ``com``.
-        tick_ms: ``(N,)`` computing time of each tick, in milliseconds, without the estimator.
-        estimator_ms: ``(N,)`` of the estimator.
+        solved: ``(N,)`` bool, whether the controller's program was solved. If not, the robot holds its last
+            torques for a while, and then sits down.
         metrics: figures of merit, see :func:`metrics_of`.
         meta: how it was run.
         terrain: on what.
         joint_names: of ``qpos[:, 7:]``.
+        times: computing times in milliseconds, ``(N,)`` each: ``tick`` of the controller, ``estimator``.
+            Not in the run file, so that two runs of one seed give the same file; empty when read from one.
     """
 
     LOGGED: ClassVar[tuple[str, ...]] = (
@@ -65,9 +70,9 @@ class Run:
             "com_ref",
             "com_velocity_ref",
             "p_ref",
-            "tick_ms",
+            "solved",
         ),
-        *("base_estimate", "base_velocity_estimate", "com_estimate", "estimator_ms"),
+        *("base_estimate", "base_velocity_estimate", "com_estimate"),
     )
 
     t: np.ndarray
@@ -87,15 +92,15 @@ class Run:
     com_ref: np.ndarray
     com_velocity_ref: np.ndarray
     p_ref: np.ndarray
-    tick_ms: np.ndarray
+    solved: np.ndarray
     base_estimate: np.ndarray
     base_velocity_estimate: np.ndarray
     com_estimate: np.ndarray
-    estimator_ms: np.ndarray
     metrics: dict[str, Any]
     meta: dict[str, Any]
     terrain: Terrain
     joint_names: list[str]
+    times: dict[str, np.ndarray] = field(default_factory=dict)
 
     def save(self, path: str | os.PathLike) -> None:
         """Write the run file (``numpy.savez``), whole or not at all.
@@ -104,7 +109,8 @@ class Run:
             OSError: the file can't be written.
         """
         arrays = {name: getattr(self, name) for name in self.LOGGED}
-        texts = {name: getattr(self, name) for name in ("metrics", "meta", "joint_names")}
+        metrics = {name: value for name, value in self.metrics.items() if name not in TIMINGS}
+        texts = {"metrics": metrics, "meta": self.meta, "joint_names": self.joint_names}
         archive.save(path, arrays, texts | {"terrain": self.terrain.to_dict()}, FORMAT)
 
     @classmethod
@@ -116,6 +122,7 @@ class Run:
             OSError: the file can't be read.
         """
         data = archive.load(path, "run", cls.LOGGED, ("metrics", "meta", "joint_names", "terrain"), FORMAT)
+        data["metrics"] = dict.fromkeys(TIMINGS) | data["metrics"]
         data["terrain"] = Terrain.from_dict(data["terrain"], source=f"{path}: terrain")
         return cls(**data)
 
@@ -129,7 +136,8 @@ def metrics_of(
     slip: float,
     astray: float,
     fall_time: float | None,
-    qp_failures: int,
+    rescues: int,
+    times: dict[str, Any],
     meta: dict[str, Any],
 ) -> dict[str, Any]:
     """Return the figures of merit of a run, all of them JSON values.
@@ -150,7 +158,8 @@ def metrics_of(
         slip: the largest slip of a standing leg.
         astray: the largest distance of a standing leg's contact from its regions.
         fall_time: when the robot fell, since the plan's start, or None.
-        qp_failures: programs without a solution.
+        rescues: programs that OSQP left to DAQP.
+        times: of :class:`Run`, and ``wall``, that of the whole simulation in seconds.
         meta: of the run.
     """
     t, going = log["t"], log["t"] >= 0.0
@@ -184,20 +193,23 @@ def metrics_of(
         "base_rms_rad": tilt,
         "base_rms_xyz_m": np.sqrt(np.mean(error**2, axis=0)).tolist() if going.any() else None,
         "base_rms_rpy_rad": np.sqrt(np.mean(angles**2, axis=0)).tolist() if going.any() else None,
-        **_estimation(log, distance, meta),
+        **_estimation(log, distance, times, meta),
         "slip_max_m": slip,
         "region_violation_max_m": astray,
-        "tick_ms_median": float(np.median(log["tick_ms"])),
-        "tick_ms_p99": float(np.percentile(log["tick_ms"], 99)),
-        "real_time_factor": simulated / meta["wall_time"],
-        "qp_failures": qp_failures,
+        "tick_ms_median": float(np.median(times["tick"])),
+        "tick_ms_p99": float(np.percentile(times["tick"], 99)),
+        "real_time_factor": simulated / times["wall"],
+        "qp_failures": int(np.sum(~log["solved"])),
+        "qp_rescues": rescues,
         "upright": not fell,
         "fell": fell,
         "fall_time_s": fall_time,
     }
 
 
-def _estimation(log: dict[str, np.ndarray], distance: float, meta: dict[str, Any]) -> dict[str, Any]:
+def _estimation(
+    log: dict[str, np.ndarray], distance: float, times: dict[str, Any], meta: dict[str, Any]
+) -> dict[str, Any]:
     """Return how good the estimate was from the plan's start on; None if there was none.
 
     The drift is by how much the estimated displacement of the trunk differs from the true one, in per cent
@@ -211,7 +223,7 @@ def _estimation(log: dict[str, np.ndarray], distance: float, meta: dict[str, Any
     slow = (log["base_velocity_estimate"][:, :3] - log["qvel"][:, :3])[going]
     drift = 100.0 * float(np.linalg.norm(error[-1] - error[0])) / distance if distance > 0.01 else None
     speed_error = float(np.sqrt(np.mean(np.sum(slow**2, axis=1))))
-    return dict(zip(names, (drift, speed_error, float(np.median(log["estimator_ms"]))), strict=True))
+    return dict(zip(names, (drift, speed_error, float(np.median(times["estimator"]))), strict=True))
 
 
 def _lift_off(

@@ -112,6 +112,7 @@ class _Execution:
             estimator.start(qpos[:3], self.sensors.tilted(self.truth.R_wb))
         self.normals = self.tracker.footing.normals
         self.log: dict[str, list] = {name: [] for name in Run.LOGGED}
+        self.times: dict[str, list] = {"tick": [], "estimator": []}
         self.work = np.zeros(2)
         self.asked = np.zeros((4, 3))
         self.slip, self.slip_max, self.standing = np.zeros((4, 3)), 0.0, np.zeros(4, int)
@@ -125,8 +126,7 @@ class _Execution:
             "joint_friction": joint_friction,
             "trunk_mass_scale": trunk_mass_scale,
             "plan": {
-                key: plan.meta.get(key)
-                for key in ("stage", "objective", "bound", "gap", "status", "solve_time", "nodes")
+                key: plan.meta.get(key) for key in ("stage", "objective", "bound", "gap", "status", "nodes")
             },
         }
 
@@ -153,8 +153,9 @@ class _Execution:
             if self._fallen():
                 fall_time = t
                 break
-        self.meta["wall_time"] = time.perf_counter() - began
+        wall = time.perf_counter() - began
         data = {name: np.array(values) for name, values in self.log.items()}
+        times = {name: 1e3 * np.array(values) for name, values in self.times.items()}
         metrics = metrics_of(
             data,
             self.plan,
@@ -164,7 +165,8 @@ class _Execution:
             self.slip_max,
             self.astray,
             fall_time,
-            self.controller.failures,
+            self.controller.rescues,
+            times | {"wall": wall},
             self.meta,
         )
         return Run(
@@ -173,6 +175,7 @@ class _Execution:
             meta=self.meta,
             terrain=self.plan.terrain,
             joint_names=self.robot.joint_names,
+            times=times,
         )
 
     def _tick(self, t: float) -> np.ndarray:
@@ -214,14 +217,15 @@ class _Execution:
             "com_ref": ref.com,
             "com_velocity_ref": ref.com_velocity,
             "p_ref": ref.ends + dynamics.contact_offsets(ground.normals, present),
-            "tick_ms": 1e3 * elapsed,
+            "solved": command.solved,
             "base_estimate": qpos[:7].copy(),
             "base_velocity_estimate": qvel[:6].copy(),
             "com_estimate": dynamics.com,
-            "estimator_ms": 1e3 * estimator_time,
         }
         for name, value in sample.items():
             self.log[name].append(value)
+        self.times["tick"].append(elapsed)
+        self.times["estimator"].append(estimator_time)
         return command.torques
 
     def _known(self, touching: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:

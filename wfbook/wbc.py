@@ -15,13 +15,16 @@ others, so here they are eliminated. Where the paper's program is not usable as 
 - while no foot is down nothing can move the robot along the rolling direction, so no task may ask for it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from wfbook.go1_dynamics import GRAVITY, Go1Dynamics, cross
 from wfbook.qp import QuadraticProgram, Solver
 from wfbook.reference import Gains, Ground, Reference
+
+TICK = 0.002
+"""Time from tick to tick, in seconds."""
 
 LEG_COLUMNS = 6 + np.arange(12).reshape(4, 3)
 """Where the joints of each leg stand in the 18 accelerations."""
@@ -78,18 +81,25 @@ def contacts(robot: Go1Dynamics, ground: Ground, wheels: np.ndarray) -> Contacts
 def base_acceleration(robot: Go1Dynamics, ref: Reference, gains: Gains) -> tuple[np.ndarray, np.ndarray]:
     """Return the reference accelerations of CoM and trunk (Paper A, eq. 34), each ``(3,)`` in the world.
 
-    The orientation error is the rotation vector from the trunk to its reference; the paper's difference
-    of angles is its limit for small angles.
+    For the orientation see :func:`attitude_error`.
     """
     linear = (
         ref.com_acceleration
         + gains.com_kp * (ref.com - robot.com)
         + gains.com_kd * (ref.com_velocity - robot.com_velocity)
     )
-    E = ref.R_wb @ robot.R_wb.T
-    error = 0.5 * np.array([E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]])  # sin(angle) · axis
     omega = robot.R_wb @ robot.velocity[3:6]
-    return linear, gains.attitude_kp * error + gains.attitude_kd * (ref.omega - omega)
+    proportional = gains.attitude_kp * attitude_error(robot, ref)
+    return linear, ref.angular_acceleration + proportional + gains.attitude_kd * (ref.omega - omega)
+
+
+def attitude_error(robot: Go1Dynamics, ref: Reference) -> np.ndarray:
+    """Return the rotation vector from the trunk to its reference, ``(3,)`` in the world.
+
+    Its length is the sine of the angle. The paper's difference of angles is its limit for small ones.
+    """
+    E = ref.R_wb @ robot.R_wb.T
+    return 0.5 * np.array([E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]])
 
 
 def wheel_acceleration(robot: Go1Dynamics, ref: Reference, along: np.ndarray, gains: Gains) -> np.ndarray:
@@ -237,7 +247,7 @@ class WholeBodyController:
     Args:
         robot: dynamics, which the caller updates before each tick.
         gains: gains and weights.
-        solver: ``"osqp"``, or ``"daqp"``, an exact active-set method the tests compare with.
+        solver: ``"osqp"``, or ``"daqp"``, an exact active-set method.
         patience: how many ticks in a row the last good torques are held when a program is not solved. After
             that the joints are only damped, and the robot sits down.
 
@@ -254,6 +264,7 @@ class WholeBodyController:
         self.failures = 0
         self._misses = 0
         self._last: Command | None = None
+        self._integral = np.zeros(3)
         self._program = QuadraticProgram(*_pattern(), solver)
 
     def problem(
@@ -301,8 +312,15 @@ class WholeBodyController:
         lower[_TORQUES], upper[_TORQUES] = -robot.effort - h[6:], robot.effort - h[6:]
         return P, q, A, lower, upper, contact
 
+    @property
+    def rescues(self) -> int:
+        """How many programs OSQP left to DAQP."""
+        return self._program.rescues
+
     def tick(self, ref: Reference, ground: Ground) -> Command:
         """Solve for the torques at the robot's present state."""
+        self._integrate(ref)
+        ref = replace(ref, angular_acceleration=ref.angular_acceleration + self._integral)
         *program, contact = self.problem(ref, ground)
         u = self._program.solve(*program)
         if u is None:
@@ -313,6 +331,18 @@ class WholeBodyController:
         self._misses = 0
         self._last = Command(torques, u[:18], forces, True)
         return self._last
+
+    def _integrate(self, ref: Reference) -> None:
+        """Add a tilt up that stays: against eq. 34 alone, dry friction in the joints holds two degrees.
+
+        On two legs a tilt is no sign of friction, and there is nothing to correct it with: there it fades.
+        """
+        gains = self.gains
+        if ref.stance.sum() >= 3:
+            self._integral += TICK * gains.attitude_ki * attitude_error(self.robot, ref)
+            self._integral = np.clip(self._integral, -gains.most_integral, gains.most_integral)
+        else:
+            self._integral *= 1.0 - TICK / gains.integral_fade
 
     def _without_solution(self) -> Command:
         """Hold the last good torques for a while, then only damp the joints."""
