@@ -101,7 +101,10 @@ def _parser() -> argparse.ArgumentParser:
     execution = run.add_argument_group("execution")
     execution.add_argument("--delay-ms", type=whole(0), default=9, help="torque delay (9 ms)")
     execution.add_argument(
-        "--state", choices=("estimated", "true"), default="true", help="what the controller sees"
+        "--state",
+        choices=("estimated", "true"),
+        default="estimated",
+        help="what the controller sees: the state it estimates from noisy sensors (default), or the true one",
     )
     execution.add_argument("--seed", type=whole(0), default=0, help="of everything random (0)")
     output = run.add_argument_group("output")
