@@ -136,9 +136,9 @@ def run(arguments: argparse.Namespace) -> int:
             if not finished:
                 raise
             code = stop.code if isinstance(stop, SystemExit) else INTERRUPTED
-            raise CommandError(f"interrupted, {_kept(study, finished, folder)}", code) from None
-        except cluster.ClusterError as error:
-            raise CommandError(f"{error}; {_kept(study, finished, folder)}", FAILED) from None
+            raise CommandError(f"interrupted{_kept(study, finished, folder)}", code) from None
+        except (cluster.ClusterError, store.StoreError) as error:
+            raise CommandError(f"{error}{_kept(study, finished, folder)}", FAILED) from None
         if not finished:
             raise CommandError(f"--runs 0: no run is finished in {str(folder)!r}", FAILED)
         report = plain(_report(study, finished) | {"session_s": time.perf_counter() - began})
@@ -284,7 +284,12 @@ def _results(
 
 
 def _kept(study: Study, finished: dict[str, dict[str, Any]], folder: Path) -> str:
-    return f"{len(finished)} of {len(study.cases)} runs are kept in {str(folder)!r}, the same command goes on"
+    """Return how a message that the study ends early goes on."""
+    if not finished:
+        return ""
+    return (
+        f", {len(finished)} of {len(study.cases)} runs are kept in {str(folder)!r}, the same command goes on"
+    )
 
 
 def _report(study: Study, finished: dict[str, dict[str, Any]]) -> dict[str, Any]:

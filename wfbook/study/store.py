@@ -17,9 +17,16 @@ NAME = "runs.sqlite"
 FORMAT = 1
 """Version of the file; one of another version is refused."""
 
+_NEW = f"""
+    BEGIN;
+    CREATE TABLE runs (key TEXT PRIMARY KEY, row TEXT NOT NULL);
+    PRAGMA user_version = {FORMAT};
+    COMMIT;
+"""
+
 
 class StoreError(ValueError):
-    """The folder can't be used: another program has it, or it holds something else."""
+    """The folder can't be used: another program has it, it holds something else, or the disk is full."""
 
 
 class Store:
@@ -35,9 +42,16 @@ class Store:
         return {key: json.loads(row) for key, row in found}
 
     def keep(self, key: str, row: dict[str, Any]) -> None:
-        """Keep a row; once this returns, not even a power cut takes it away."""
-        with self._connection:
-            self._connection.execute("INSERT OR REPLACE INTO runs VALUES (?, ?)", (key, json.dumps(row)))
+        """Keep a row; once this returns, not even a power cut takes it away.
+
+        Raises:
+            StoreError: the file can't be written, as on a full disk; what it held stays.
+        """
+        try:
+            with self._connection:
+                self._connection.execute("INSERT OR REPLACE INTO runs VALUES (?, ?)", (key, json.dumps(row)))
+        except sqlite3.OperationalError as error:
+            raise StoreError(f"{NAME} can't be written: {error}") from None
 
     def forget(self, keys: list[str]) -> None:
         """Drop rows."""
@@ -97,9 +111,8 @@ def _connection(path: Path) -> sqlite3.Connection:
         tables = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
         if version != FORMAT and tables:
             raise StoreError(f"{str(path)!r}: format {version}, this program reads {FORMAT}")
-        with connection:
-            connection.execute("CREATE TABLE IF NOT EXISTS runs (key TEXT PRIMARY KEY, row TEXT NOT NULL)")
-            connection.execute(f"PRAGMA user_version = {FORMAT}")
+        if not tables:
+            connection.executescript(_NEW)
     except sqlite3.DatabaseError as error:
         connection.close()
         raise StoreError(f"{str(path)!r}: not a file of finished runs, or damaged ({error})") from None
