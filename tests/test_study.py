@@ -111,6 +111,14 @@ def kept(folder):
         connection.close()
 
 
+def living(process):
+    """Whether a process still runs; nobody waits for a killed grandchild, which may stay a zombie."""
+    try:
+        return process.status() != psutil.STATUS_ZOMBIE
+    except psutil.NoSuchProcess:
+        return False
+
+
 @pytest.fixture(scope="module")
 def killed(good, bad, tmp_path_factory):
     """A real study that was killed and went on: its folder, words, and the rows when it was killed."""
@@ -123,8 +131,13 @@ def killed(good, bad, tmp_path_factory):
     )
     while len(kept(folder)) < 2 and process.poll() is None:
         time.sleep(0.02)
+    workers = psutil.Process(process.pid).children(recursive=True)
     process.kill()
     process.communicate(timeout=30)
+    until = time.monotonic() + 20.0
+    while any(living(worker) for worker in workers):
+        assert time.monotonic() < until, "workers outlive their study"
+        time.sleep(0.05)
     before = kept(folder)
     assert {path.name for path in folder.iterdir()} <= {"runs.sqlite", "runs.sqlite-journal"}
     assert study(folder, *words, "--workers", "2") == 1  # the bad plan's runs
