@@ -156,24 +156,28 @@ def _check(arguments: argparse.Namespace) -> None:
         raise CommandError(f"TERRAIN {arguments.terrains[0]!r} has no effect with --plan", WRONG_INPUT)
     if arguments.scheduler and arguments.workers:
         raise CommandError("--workers has no effect with --scheduler", WRONG_INPUT)
-    pairs = [("--sweep", levels) for levels in arguments.sweep or ()]
-    pairs += [("--grid", levels) for grid in arguments.grid or () for levels in grid]
-    base = {axis.name: value for axis, value in arguments.set}
-    names = [design.name_of(levels) for levels in arguments.sweep or ()]
-    names += [design.name_of(*grid) for grid in arguments.grid or ()]
+    sweeps, grids = arguments.sweep or (), arguments.grid or ()
+    experiments = [("--sweep", [sweep]) for sweep in sweeps] + [("--grid", grid) for grid in grids]
+    names = [design.name_of(*factors) for _, factors in experiments]
     for name in names:
         if names.count(name) > 1:
             raise CommandError(f"{name} is asked for twice", WRONG_INPUT)
-    for one, other in arguments.grid or ():
+    for one, other in grids:
         if one[0] == other[0]:
             raise CommandError(f"--grid: {one[0].name} stands against itself", WRONG_INPUT)
-    pushed = base.get("push") or any(axis.name == "push" for _, (axis, _) in pairs)
-    asked = [*pairs, *(("--set", pair) for pair in arguments.set)]
-    for option, (axis, _) in asked:
-        if axis.name in axes.ONLY_PUSHED and not pushed:
-            raise CommandError(f"{option} {axis.name} has no effect without --set push=N", WRONG_INPUT)
-        if axis.name == "sensor_noise" and arguments.state == "true":
-            raise CommandError(f"{option} {axis.name} has no effect with --state true", WRONG_INPUT)
+    pushed = any(axis.name == "push" and value for axis, value in arguments.set)
+    for option, factors in [*experiments, ("--set", arguments.set)]:
+        together = {axis.name for axis, _ in factors}
+        for name in together & set(axes.ONLY_PUSHED):
+            # What is set may serve a push that is swept, as it is in the standard study.
+            swept = any("push" in other.split(" x ") for other in names) or not names
+            elsewhere = option == "--set" and swept
+            if not (pushed or "push" in together or elsewhere):
+                raise CommandError(f"{option} {name} has no effect without --set push=N", WRONG_INPUT)
+        if "sensor_noise" in together and arguments.state == "true":
+            raise CommandError(f"{option} sensor_noise has no effect with --state true", WRONG_INPUT)
+    if arguments.wheel_model != Study.wheel_model and arguments.state == "true":
+        raise CommandError("--wheel-model has no effect with --state true", WRONG_INPUT)
 
 
 @contextlib.contextmanager

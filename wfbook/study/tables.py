@@ -12,6 +12,9 @@ from wfbook.study.design import Study, name_of, points
 CONFIDENCE = 0.95
 """Of the intervals of survival shares."""
 
+ARRIVED = 0.1, 0.02
+"""A robot arrives if its distance is so near to the plan's: a share of that, or metres, whichever is more."""
+
 _TEXTS = ("error", "traceback", "wheel_model", "worker", "status")
 """Columns that may be empty in all runs, and would hold text."""
 
@@ -75,7 +78,11 @@ def wilson(survived: int, runs: int) -> tuple[float, float] | None:
 
 
 def survival(rows: Iterable[dict[str, Any]]) -> dict[str, Any]:
-    """Return how many of these runs stayed upright to the end, of those without an error."""
+    """Return how many of these runs stayed upright to the end, of those without an error.
+
+    A robot may stand upright before a step that its wheels can't take: ``arrived`` are those that stayed
+    upright and moved as far as they were to.
+    """
     rows = list(rows)
     runs = [row for row in rows if row["error"] is None]
     upright = sum(row["upright"] for row in runs)
@@ -84,12 +91,18 @@ def survival(rows: Iterable[dict[str, Any]]) -> dict[str, Any]:
     return {
         "runs": len(runs),
         "upright": upright,
+        "arrived": sum(row["upright"] and _arrived(row) for row in runs),
         "share": upright / len(runs) if runs else None,
         "low": low,
         "high": high,
         "errors": len(rows) - len(runs),
         "base_rms_m_median": statistics.median(errors) if errors else None,
     }
+
+
+def _arrived(row: dict[str, Any]) -> bool:
+    planned = row["planned_distance_m"]
+    return abs(row["distance_m"] - planned) <= max(ARRIVED[0] * planned, ARRIVED[1])
 
 
 def summary(study: Study, finished: dict[str, dict[str, Any]]) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from typing import Any
 from wfbook.report import aligned
 from wfbook.study.tables import CONFIDENCE
 
-_HEADING = ("upright", "share", f"{100 * CONFIDENCE:.0f} % interval", "body rms (mm)", "errors")
+_HEADING = ("upright", "share", f"{100 * CONFIDENCE:.0f} % interval", "arrived", "body rms (mm)", "errors")
 
 
 def report_text(report: dict[str, Any]) -> str:
@@ -43,12 +43,13 @@ def _titled(title: str, text: str) -> str:
 
 def _cell(cell: dict[str, Any]) -> tuple[str, ...]:
     if not cell["runs"]:
-        return "0/0", "", "", "", str(cell["errors"] or "")
+        return "0/0", "", "", "", "", str(cell["errors"] or "")
     rms = cell["base_rms_m_median"]
     return (
         f"{cell['upright']}/{cell['runs']}",
         f"{100 * cell['share']:.0f} %",
         f"{100 * cell['low']:.0f} to {100 * cell['high']:.0f} %",
+        str(cell["arrived"]),
         "" if rms is None else f"{1e3 * rms:.1f}",
         str(cell["errors"] or ""),
     )

@@ -37,6 +37,7 @@ def sweeps(report: dict[str, Any]) -> Picture:
         tidy(axes)
         axes.set_xlabel(mine[0]["labels"][0])
         axes.set_ylim(-0.05, 1.05)
+        axes.locator_params(axis="x", nbins=5)
         axes.axvline(_usual(report, name), color=BODY, linewidth=0.8, linestyle=":", gid="usual")
         for sweep in mine:
             _curve(axes, sweep, len(mine), plans.index(sweep["plan"]))
