@@ -13,7 +13,8 @@ ROOT = Path(wfbook.__file__).parent
 ORDER = (
     "archive", "polygon", "terrain", "centroidal", "swing", "modes", "friction", "planner", "go1",
     "go1_dynamics", "reference", "qp", "wbc", "sensors", "leg_odometry", "estimator", "footing", "lean",
-    "tracking", "runs", "simulate", "view", "report", "results", "arguments", "table2", "__main__",
+    "tracking", "runs", "simulate", "view", "report", "results", "arguments", "table2",
+    "study", "__main__",
 )  # fmt: skip
 """The modules and packages, helpers before the chapter that they serve."""
 
@@ -64,4 +65,5 @@ def test_importing_the_package_imports_nothing_heavy():
     loaded = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
     ).stdout.split()
-    assert not {"cvxpy", "mujoco", "pinocchio", "pyscipopt", "scipy", *DRAWING} & set(loaded)
+    heavy = {"cvxpy", "dask", "distributed", "mujoco", "pinocchio", "pyarrow", "pyscipopt", "scipy"}
+    assert not (heavy | DRAWING) & set(loaded)

@@ -10,7 +10,9 @@ from wfbook.go1 import nominal
 from wfbook.modes import LEGS
 from wfbook.reference import Gains
 from wfbook.runs import TIMINGS
+from wfbook.sensors import SensorNoise
 from wfbook.simulate import Run, run
+from wfbook.terrain import Region, Terrain, flat
 from wfbook.tracking import Tracker, interpolate, swings_of
 
 
@@ -147,6 +149,26 @@ def test_dry_friction_does_not_hold_a_tilt():
         assert result.metrics["upright"]
         tilts.append(np.abs(result.rpy[-1] - result.rpy_ref[-1])[:2].max())
     assert tilts[1] < 0.5 * tilts[0]
+
+
+def test_the_robot_walks_on_the_real_ground_and_knows_only_the_plans():
+    square = flat().regions[0].vertices
+    dropped = Terrain("dropped", (Region(square - [0.0, 0.0, 0.02], 0.5, 0.0, 0.5, 0.0, "deck"),))
+    result = run(handmade.stand(1), real_terrain=dropped)
+    assert result.metrics["upright"] and result.terrain == dropped
+    np.testing.assert_allclose(result.p[-1, :, 2], -0.02, atol=0.002)
+    np.testing.assert_allclose(result.com_ref[-1], handmade.stand(1).x[-1], atol=1e-3)
+
+
+def test_worse_sensors_make_a_worse_estimate():
+    plan, noise = handmade.stand(1), SensorNoise()
+    usual, same, worse = (
+        run(plan, state="estimated", hold=0.0, noise=chosen) for chosen in (None, noise, noise.scaled(5.0))
+    )
+    np.testing.assert_array_equal(usual.base_estimate, same.base_estimate)
+    speed_errors = [r.metrics["estimate_velocity_rms_m_s"] for r in (usual, worse)]
+    assert speed_errors[1] > 2.0 * speed_errors[0]
+    assert worse.meta["sensor_noise"]["gyro"] == 5.0 * noise.gyro
 
 
 def test_a_run_survives_its_file(tmp_path, trot):

@@ -1,32 +1,36 @@
-"""The command line: ``python -m wfbook run TERRAIN | table2 | lab``."""
+"""The command line: ``python -m wfbook run TERRAIN | table2 | study | lab``."""
 
 import argparse
 import contextlib
-import importlib
 import json
-import re
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from wfbook import terrain as ground
 from wfbook.arguments import (
     FAILED,
+    GOAL_PER_SLOT,
     INTERRUPTED,
+    LONG,
     OK,
     WRONG_INPUT,
     CommandError,
     Parser,
+    file_name,
     goal,
     join_goal,
+    load,
     number,
     result_folder,
     whole,
+    wrong_input,
 )
 from wfbook.report import ProgressLine, plain, search_line, summary_table
+from wfbook.study import command as study
 from wfbook.table2 import command as table2
 
 if TYPE_CHECKING:
@@ -43,9 +47,6 @@ PLANNING = {
     "time_limit": 25.0,
 }
 """Options of planning and their defaults; no goal means ``GOAL_PER_SLOT`` ahead for each slot."""
-GOAL_PER_SLOT = 0.1
-LONG = 12
-"""Slots beyond which a first plan is found in overlapping windows."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -112,6 +113,7 @@ def _parser() -> argparse.ArgumentParser:
     output.add_argument("--json", action="store_true", help="print the metrics as JSON instead of a table")
 
     table2.add_to(commands)
+    study.add_to(commands)
 
     lab = commands.add_parser("lab", help="open the notebooks in JupyterLab", allow_abbrev=False)
     lab.set_defaults(command=_lab)
@@ -127,10 +129,10 @@ def _run(arguments: argparse.Namespace) -> int:
     else:
         problem = _problem(arguments)
     name = (plan or problem).terrain.name
-    target = arguments.out or Path("runs") / _folder_name(name)
+    target = arguments.out or Path("runs") / file_name(name)
     with contextlib.ExitStack() as stack:
         folder = stack.enter_context(result_folder(target, FILES))
-        _load("wfbook.simulate", "wfbook.view.figures", "wfbook.view.replay")
+        load("wfbook.simulate", "wfbook.view.figures", "wfbook.view.replay")
         relaxed = None
         if plan is None:
             relaxed, plan = _planned(problem, arguments)
@@ -148,10 +150,10 @@ def _given_plan(arguments: argparse.Namespace) -> "Plan":
     for option in PLANNING:
         if getattr(arguments, option) is not None:
             raise CommandError(f"--{option.replace('_', '-')} has no effect with --plan", WRONG_INPUT)
-    _load("wfbook.planner")
+    load("wfbook.planner")
     from wfbook.planner import Plan
 
-    with _wrong_input():
+    with wrong_input():
         plan = Plan.load(arguments.plan)
         asked = arguments.terrain and ground.named_or_file(arguments.terrain)
     if asked and asked != plan.terrain:
@@ -167,48 +169,21 @@ def _problem(arguments: argparse.Namespace) -> "Problem":
     if arguments.terrain is None:
         known = ", ".join(ground.BUILTIN_NAMES)
         raise CommandError(f"TERRAIN is missing: one of {known}, or a file ending in .json", WRONG_INPUT)
-    with _wrong_input():
+    with wrong_input():
         terrain = ground.named_or_file(arguments.terrain)
     for option, default in PLANNING.items():
         if getattr(arguments, option) is None:
             setattr(arguments, option, default)
-    _load("wfbook.planner")
+    load("wfbook.planner")
     from wfbook.planner import Problem
 
-    with _wrong_input():
+    with wrong_input():
         return Problem(
             terrain,
             goal=arguments.goal or (GOAL_PER_SLOT * arguments.slots, 0.0),
             slots=arguments.slots,
             end_effectors=("foot",) if arguments.feet_only else ("foot", "wheel"),
         )
-
-
-def _load(*modules: str) -> None:
-    """Import modules with signals held back: broken into, extension modules end in an ImportError."""
-    held = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
-    try:
-        for module in modules:
-            importlib.import_module(module)
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, held)
-
-
-@contextlib.contextmanager
-def _wrong_input() -> Iterator[None]:
-    """Turn what is wrong with a file or a value into one line and exit code 2."""
-    try:
-        yield
-    except ValueError as error:
-        raise CommandError(" ".join(str(error).split()), WRONG_INPUT) from None
-    except OSError as error:
-        text = f"{error.filename!r}: {error.strerror}" if error.filename else str(error)
-        raise CommandError(text, WRONG_INPUT) from None
-
-
-def _folder_name(terrain_name: str) -> str:
-    """A terrain's name as a folder's: what is not a letter, a digit, a dash or a dot becomes a dash."""
-    return re.sub(r"[^\w.-]+", "-", terrain_name).strip("-.") or "terrain"
 
 
 def _planned(problem: "Problem", arguments: argparse.Namespace) -> "tuple[Plan, Plan]":
@@ -234,7 +209,7 @@ def _executed(plan: "Plan", arguments: argparse.Namespace) -> "Run":
     from wfbook import simulate
 
     # A plan from elsewhere may be well-formed and yet ask for what the robot can't do.
-    given = _wrong_input() if arguments.plan else contextlib.nullcontext()
+    given = wrong_input() if arguments.plan else contextlib.nullcontext()
     with given, ProgressLine(sys.stderr) as line:
         return simulate.run(
             plan,

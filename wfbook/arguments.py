@@ -2,7 +2,10 @@
 
 import argparse
 import contextlib
+import importlib
 import math
+import re
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NoReturn
@@ -11,6 +14,12 @@ from wfbook.results import ResultFolder
 
 OK, FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 """Exit codes."""
+
+GOAL_PER_SLOT = 0.1
+"""How far to go, m for each slot, where nothing else is asked."""
+
+LONG = 12
+"""Slots beyond which a first plan is found in overlapping windows."""
 
 
 class CommandError(Exception):
@@ -95,3 +104,30 @@ def result_folder(target: str | Path, names: tuple[str, ...]) -> Iterator[Result
                 f"--out {str(target)!r} can't be written: {error.strerror}", WRONG_INPUT
             ) from None
         yield folder
+
+
+@contextlib.contextmanager
+def wrong_input() -> Iterator[None]:
+    """Turn what is wrong with a file or a value into one line and exit code 2."""
+    try:
+        yield
+    except ValueError as error:
+        raise CommandError(" ".join(str(error).split()), WRONG_INPUT) from None
+    except OSError as error:
+        text = f"{error.filename!r}: {error.strerror}" if error.filename else str(error)
+        raise CommandError(text, WRONG_INPUT) from None
+
+
+def file_name(terrain_name: str) -> str:
+    """A terrain's name as a file's: what is not a letter, a digit, a dash or a dot becomes a dash."""
+    return re.sub(r"[^\w.-]+", "-", terrain_name).strip("-.") or "terrain"
+
+
+def load(*modules: str) -> None:
+    """Import modules with signals held back: broken into, extension modules end in an ImportError."""
+    held = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGTERM})
+    try:
+        for module in modules:
+            importlib.import_module(module)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, held)

@@ -9,7 +9,8 @@ noise. The IMU reports what happened *between* the two, as those that integrate 
 instant, an impact would be missed or counted twice.
 """
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Self
 
 import numpy as np
 import pinocchio as pin
@@ -43,6 +44,10 @@ class SensorNoise:
     joint_offset: float = 5e-4
     wheel_rate: float = 0.05
     tilt: float = 2e-3
+
+    def scaled(self, factor: float) -> Self:
+        """Return sensors that are so many times worse, in everything."""
+        return type(self)(**{name: factor * value for name, value in asdict(self).items()})
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ Physics runs at 1 kHz, the controller at 500 Hz, and a torque acts one delay aft
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import asdict, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,12 +18,13 @@ from wfbook.go1_dynamics import MOTORS, WHEELS, Go1Dynamics, roll_pitch_yaw
 from wfbook.modes import END_EFFECTORS, LEGS
 from wfbook.reference import Gains, Ground, Reference
 from wfbook.runs import Run, metrics_of
-from wfbook.sensors import Sensors
+from wfbook.sensors import SensorNoise, Sensors
 from wfbook.tracking import Tracker
 from wfbook.wbc import WholeBodyController, contacts, weight_share
 
 if TYPE_CHECKING:
     from wfbook.planner.plan import Plan
+    from wfbook.terrain import Terrain
 
 __all__ = ["Run", "run"]
 
@@ -46,6 +47,8 @@ def run(
     trunk_mass_scale: float = 1.0,
     gains: Gains | None = None,
     wheel_model: str = "encoder",
+    noise: SensorNoise | None = None,
+    real_terrain: "Terrain | None" = None,
 ) -> Run:
     """Execute a plan: settle in its first posture, follow it, stand still at its end.
 
@@ -64,6 +67,9 @@ def run(
         trunk_mass_scale: of the simulated trunk, likewise.
         gains: of the controller.
         wheel_model: of the estimator, one of :data:`wfbook.estimator.WHEEL_MODELS`.
+        noise: of the simulated sensors, which the estimator does not know: it trusts the usual ones.
+        real_terrain: on which the robot walks, if not on the one of the plan, which is all that the
+            controller and the estimator know.
 
     Raises:
         ValueError: an argument is out of range, or the plan's first posture is out of reach.
@@ -76,9 +82,10 @@ def run(
     estimator = Estimator(wheel_model)
     if state == "true":
         estimator = None
-    return _Execution(plan, delay, seed, push, joint_friction, trunk_mass_scale, gains, estimator).run(
-        hold, progress
-    )
+    robot = Go1(real_terrain or plan.terrain, joint_friction, trunk_mass_scale)
+    execution = _Execution(plan, delay, robot, Sensors(seed, noise), seed, push, gains, estimator)
+    execution.meta |= {"joint_friction": joint_friction, "trunk_mass_scale": trunk_mass_scale}
+    return execution.run(hold, progress)
 
 
 class _Execution:
@@ -88,15 +95,15 @@ class _Execution:
         self,
         plan: "Plan",
         delay: float,
+        robot: Go1,
+        sensors: Sensors,
         seed: int,
         push: tuple[np.ndarray, float, float] | None,
-        joint_friction: float,
-        trunk_mass_scale: float,
         gains: Gains | None,
         estimator: Estimator | None,
     ) -> None:
         self.plan, self.delay, self.push = plan, delay, push
-        self.robot = Go1(plan.terrain, joint_friction, trunk_mass_scale)
+        self.robot = robot
         self.dynamics = Go1Dynamics()
         self.truth = self.dynamics if estimator is None else Go1Dynamics()
         self.controller = WholeBodyController(self.dynamics, gains)
@@ -106,7 +113,7 @@ class _Execution:
         qpos = self.dynamics.posture(plan.x[0], self.tracker.lean.at(-SETTLE)[0], self.tracker.start_ends())
         qpos[1 + MOTORS] += 0.002 * np.random.default_rng(seed).standard_normal(12)
         self.robot.reset(qpos, kinds)
-        self.estimator, self.sensors = estimator, Sensors(seed)
+        self.estimator, self.sensors = estimator, sensors
         if estimator is not None:
             self.truth.update(qpos, np.zeros(22))
             estimator.start(qpos[:3], self.sensors.tilted(self.truth.R_wb))
@@ -122,9 +129,8 @@ class _Execution:
             "seed": seed,
             "state": "true" if estimator is None else "estimated",
             "wheel_model": None if estimator is None else estimator.wheel_model,
+            "sensor_noise": None if estimator is None else asdict(sensors.noise),
             "settle": SETTLE,
-            "joint_friction": joint_friction,
-            "trunk_mass_scale": trunk_mass_scale,
             "plan": {
                 key: plan.meta.get(key) for key in ("stage", "objective", "bound", "gap", "status", "nodes")
             },
@@ -173,7 +179,7 @@ class _Execution:
             **data,
             metrics=metrics,
             meta=self.meta,
-            terrain=self.plan.terrain,
+            terrain=self.robot.terrain,
             joint_names=self.robot.joint_names,
             times=times,
         )
