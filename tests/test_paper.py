@@ -123,7 +123,7 @@ def test_speeds_and_gains_are_those_of_the_runs(tmp_path):
     assert found["both.faster"].ours == pytest.approx(gains[1])
     assert found["both.faster"].high == pytest.approx(max(gains))
     assert found["planned to be faster than feet only, feet and wheels"].ours == pytest.approx(100.0)
-    assert "gap 2.00 % (time limit); seeds 0, 1, 2, true state" in found["feet.distance"].proof
+    assert "gap 2.00 % (time limit, 0.5 s); seeds 0, 1, 2, true state" in found["feet.distance"].proof
 
 
 def test_speed_is_asked_alike_of_all_three():

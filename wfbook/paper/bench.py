@@ -1,7 +1,7 @@
 """Where the experiments plan and simulate: every search and every run goes through here and is kept."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -29,6 +29,9 @@ LONG = 20
 SWINGING = 2
 """Mode of a leg that touches nothing, beside 0, on its foot, and 1, on its wheel."""
 
+_PLACED = ("start_end_effectors", "swing_height", "com_height", "regions")
+"""Entries of a plan's ``meta`` that say how it is executed."""
+
 _EVERY = 5  # samples of a run between two that are kept: 100 Hz
 _FORMAT = 1
 
@@ -44,7 +47,7 @@ class Planned:
     def proof(self) -> str:
         """What the search proved."""
         meta = self.relaxed.meta
-        return f"gap {percent(meta['gap'])} ({meta['status']})"
+        return f"gap {percent(meta['gap'])} ({meta['status']}, {meta['solve_time']:.1f} s)"
 
 
 @dataclass(frozen=True)
@@ -150,8 +153,7 @@ class Bench:
         runs = []
         for seed in range(self.options.seeds):
             options = {"delay": DELAY, "state": self.options.state, "hold": hold, "seed": seed}
-            arrays = {name: getattr(plan, name) for name in ("x", "v", "a", "theta", "p", "lam", "S", "D")}
-            definition = {"plan": arrays, "terrain": plan.terrain, "options": options}
+            definition = {"plan": _executed(plan), "terrain": plan.terrain, "options": options}
 
             def make(options: dict[str, Any] = options) -> Execution:
                 from wfbook import simulate
@@ -199,6 +201,12 @@ def proof(planned: Planned, runs: Sequence[Execution] = ()) -> str:
         return planned.proof
     seeds = ", ".join(str(run.meta["seed"]) for run in runs)
     return f"{planned.proof}; {'seed' if len(runs) == 1 else 'seeds'} {seeds}, {runs[0].meta['state']} state"
+
+
+def _executed(plan: Plan) -> dict[str, Any]:
+    """Return what a run of a plan depends on; not how long its search took, or what it proved."""
+    arrays = {f.name: getattr(plan, f.name) for f in fields(plan) if f.name not in ("terrain", "meta")}
+    return arrays | {name: plan.meta.get(name) for name in _PLACED}
 
 
 def _relaxed_of(path: Path) -> Path:
