@@ -1,7 +1,7 @@
 """IV-A: which gait and which end effectors are chosen on the five terrains (Figs. 8 to 12).
 
-All five are planned with the same weights and limits, over the time that Fig. 8 gives, to the same goal, at the pace of
-the book's other plans. It lies beyond the last edge of every terrain.
+All five are planned with the same weights and limits, over the time that Fig. 8 gives, to the same goal, at
+the pace of the book's other plans. It lies beyond the last edge of every terrain.
 """
 
 import itertools
@@ -24,8 +24,8 @@ SLOTS = round(value("fig8.duration") / SLOT_S)
 GOAL = (GOAL_PER_SLOT * SLOTS, 0.0)
 
 LIMITS = Limits(step=(value("fig12.step") / 100.0, Limits().step[1]), speed=(0.5, Limits().speed[1]))
-"""The longest step is the paper's. Top speed is what the controller is known to follow at a trot: steps of half
-a metre at the planner's 0.8 m/s, which wheels can keep, end in a fall."""
+"""The longest step is the paper's. Top speed is what the controller is known to follow at a trot: steps of
+half a metre at the planner's 0.8 m/s, which wheels can keep, end in a fall."""
 
 
 def problem(name: str) -> Problem:
