@@ -139,6 +139,8 @@ class Bench:
         try:
             return self.store.get("plan", definition, make, _read_planned, _write_planned)
         except (planner.InfeasibleError, planner.NoPlanError) as error:
+            if str(error).startswith("interrupted"):  # before a gait that can be executed
+                raise KeyboardInterrupt from None
             self.troubles.append(f"{label}: {' '.join(str(error).split())}")
             return None
 
