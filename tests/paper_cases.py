@@ -1,12 +1,18 @@
 """Plans and runs by hand for the comparison with the paper, so that no test waits for a search."""
 
-from dataclasses import replace
+import json
+from dataclasses import dataclass, replace
 
 import numpy as np
 from view_cases import SLOT, small_plan
 
-from wfbook.paper.bench import Execution
+from wfbook.paper.bench import Bench, Execution, Planned
+from wfbook.paper.options import Options
+from wfbook.paper.record import Record
+from wfbook.paper.store import Store
 from wfbook.planner import Plan, Problem
+from wfbook.table2.benchmark import ROWS, Benchmark
+from wfbook.table2.trial import OUTCOME
 
 LETTERS = {".": (0, 0), "o": (0, 1), "f": (1, 0), "w": (1, 1)}
 """What a leg does in a slot: stands on its foot or wheel, swings and lands on its foot or wheel."""
@@ -48,3 +54,52 @@ def execution(plan: Plan, seed: int, cost: float = 0.5, upright: bool = True) ->
     metrics = {"distance_m": distance, "upright": upright, "cot_abs": cost, "cot_positive": 0.5 * cost}
     com = np.column_stack((x, 0 * x, 0 * x + 0.265))
     return Execution(t, com, modes, work, metrics, {"seed": seed, "state": "true", "delay": 0.009})
+
+
+REACH = {("foot",): 1.5, ("foot", "wheel"): 3.0}
+"""How far invented plans go, by end effectors."""
+
+
+@dataclass
+class Invented(Bench):
+    """A bench whose plans, runs and times are invented: feet cost 0.6, wheels 0.2, with friction 0.3."""
+
+    def plan(self, problem, label):
+        self.show(self.head + label)
+        kinds = tuple(problem.end_effectors)
+        plans = answer(problem, REACH[kinds] if problem.beyond_reach else problem.goal[0])
+        return Planned(*(plan.with_meta(gap=0.02, status="time limit") for plan in plans))
+
+    def execute(self, plan, label, hold=1.0):
+        rolls = plan.end_effector.any()
+        cost = (0.3 if plan.terrain.name == "flat-friction" else 0.2) if rolls else 0.6
+        return [execution(plan, seed, cost) for seed in range(self.options.seeds)]
+
+    def time(self, asked, label):
+        return outcome(0.1 * asked.slots * len(asked.end_effectors) * len(asked.terrain.regions))
+
+
+def outcome(search_s, status="optimal", gap=1e-3, message=None):
+    """What a timed search might find."""
+    found = {"status": status, "search_s": search_s, "gap": gap, "message": message}
+    return dict.fromkeys(OUTCOME) | found
+
+
+def invented(tmp_path, **options) -> Invented:
+    return Invented(Store(tmp_path / "cache", "stamp"), Options(**options))
+
+
+def by_key(result) -> dict[str, Record]:
+    """A result's records by the paper's key, else by what they are."""
+    return {record.paper or record.what: record for record in result.records}
+
+
+def report_file(folder, complete=True, **first):
+    """A report as ``table2`` leaves it."""
+    report = Benchmark(ROWS, ()).report | {"complete": complete}
+    for row in report["rows"]:
+        row["tight"] = outcome(2.0)
+    report["rows"][0] |= first
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "table2.json").write_text(json.dumps(report))
+    return folder / "table2.json"
