@@ -3,16 +3,19 @@
 import itertools
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from paper_cases import Invented, outcome, report_file
+from test_layout import ORDER
 from view_cases import small_plan, small_run
 
+import wfbook
 from wfbook import planner, simulate, terrain
 from wfbook.__main__ import main
 from wfbook.go1_dynamics import MOTORS
-from wfbook.paper import bench, gaits, times
+from wfbook.paper import bench, gaits, store, times
 from wfbook.paper.bench import Bench, Execution
 from wfbook.paper.options import NAMES, Options
 from wfbook.paper.parts import EXPERIMENTS
@@ -135,6 +138,23 @@ def test_a_plan_is_run_once_for_each_seed(monkeypatch, tmp_path):
     bench.execute(replace(small_plan(), terrain=terrain.flat(0.005)), "flat")
     bench.execute(small_plan(advance=0.09), "flat")
     assert len(ran) == 6
+
+
+def test_what_is_kept_holds_for_the_code_that_made_it(monkeypatch, tmp_path):
+    assert {Path(name).stem for name in store._PLANNING} == set(ORDER[: ORDER.index("planner") + 1])
+    names = ("wfbook/planner/tree.py", "wfbook/wbc.py", "wfbook/view/style.py", "assets/go1/go1.xml")
+    for name in names:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("before")
+    monkeypatch.setattr(wfbook, "__file__", str(tmp_path / "wfbook" / "__init__.py"))
+    changed = []
+    for name in names:
+        before = [store.code_stamp.__wrapped__(planning) for planning in (True, False)]
+        (tmp_path / name).write_text("after")
+        after = [store.code_stamp.__wrapped__(planning) for planning in (True, False)]
+        changed.append([one != other for one, other in zip(before, after, strict=True)])
+    assert changed == [[True, True], [False, True], [False, False], [False, True]]
+    assert Store(tmp_path).path("plan", {}) != Store(tmp_path).path("run", {})
 
 
 def test_a_timed_search_is_done_once(monkeypatch, tmp_path):

@@ -2,7 +2,7 @@
 
 A result is found by a digest of everything that it depends on: its definition (problem, options, seed), the
 package's version and the text of its modules, and the versions of the packages that compute. Whoever changes
-a weight, or a line of the planner, gets new plans.
+a weight, or a line of the planner, gets new plans; a line of the controller, new runs of the old plans.
 """
 
 import hashlib
@@ -22,6 +22,12 @@ from wfbook.terrain import Terrain
 T = TypeVar("T")
 
 _PACKAGES = ("clarabel", "cvxpy", "mujoco", "numpy", "osqp", "pin", "pyscipopt", "scipy")
+_PLANNING = (
+    *("archive.py", "centroidal.py", "friction.py", "modes.py", "planner", "polygon.py", "swing.py"),
+    "terrain.py",
+)
+"""What plans depend on: the modules in the order of the chapters up to the planner."""
+
 _TELLING = ("__main__.py", "arguments.py", "quoted.py", "report.py", "results.py", "paper", "table2", "view")
 """Modules and packages that tell, draw or compare, and change no plan and no run."""
 
@@ -36,11 +42,12 @@ class Store:
     def __init__(self, folder: str | os.PathLike, stamp: str | None = None) -> None:
         """Use a folder; ``stamp`` stands for the code that computes, by default :func:`code_stamp`."""
         self.folder = Path(folder)
-        self._stamp = code_stamp() if stamp is None else stamp
+        self._stamp = stamp
 
     def path(self, kind: str, definition: dict[str, Any]) -> Path:
         """Return where the result of a definition is kept."""
-        text = json.dumps([self._stamp, kind, described(definition)], sort_keys=True)
+        stamp = self._stamp or code_stamp(planning=kind in ("plan", "trial"))
+        text = json.dumps([stamp, kind, described(definition)], sort_keys=True)
         return self.folder / f"{kind}-{hashlib.sha256(text.encode()).hexdigest()[:20]}.npz"
 
     def get(
@@ -84,12 +91,19 @@ def described(value: Any) -> Any:
 
 
 @cache
-def code_stamp() -> str:
-    """Return a digest of the code that plans and simulates: the library's, its model's and its packages'."""
+def code_stamp(planning: bool) -> str:
+    """Return a digest of the code that plans, or plans and simulates: the library, its model, its packages.
+
+    Args:
+        planning: leave out what only simulates.
+    """
     root = Path(wfbook.__file__).parent
-    sources = [path for path in root.rglob("*.py") if path.relative_to(root).parts[0] not in _TELLING]
-    sources += (root.parent / "assets").rglob("*.xml")
+    parts = {path: path.relative_to(root).parts[0] for path in root.rglob("*.py")}
+    sources = [
+        path for path in parts if (parts[path] in _PLANNING if planning else parts[path] not in _TELLING)
+    ]
     sources += (root.parent / "assets").rglob("*.json")
+    sources += [] if planning else (root.parent / "assets").rglob("*.xml")
     digest = hashlib.sha256(wfbook.__version__.encode())
     for path in sorted(sources):
         digest.update(str(path.relative_to(root.parent)).encode() + b"\0" + path.read_bytes())
