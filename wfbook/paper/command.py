@@ -14,6 +14,7 @@ from wfbook.arguments import (
     OK,
     WRONG_INPUT,
     CommandError,
+    load,
     number,
     result_folder,
     whole,
@@ -73,6 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
         CommandError: wrong input, or interrupted with something found.
         KeyboardInterrupt: interrupted with nothing found.
     """
+    load("wfbook.paper.parts", "wfbook.simulate", "wfbook.view.paper")
     given = _table2(arguments)
     from wfbook.paper.bench import Bench
     from wfbook.paper.parts import EXPERIMENTS

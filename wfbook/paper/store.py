@@ -21,14 +21,24 @@ from wfbook.terrain import Terrain
 
 T = TypeVar("T")
 
-_PACKAGES = ("clarabel", "cvxpy", "mujoco", "numpy", "osqp", "pin", "pyscipopt", "scipy")
+_PACKAGES = ("clarabel", "cvxpy", "daqp", "mujoco", "numpy", "osqp", "pin", "pyscipopt", "scipy")
 _PLANNING = (
     *("archive.py", "centroidal.py", "friction.py", "modes.py", "planner", "polygon.py", "swing.py"),
     "terrain.py",
 )
 """What plans depend on: the modules in the order of the chapters up to the planner."""
 
-_TELLING = ("__main__.py", "arguments.py", "quoted.py", "report.py", "results.py", "paper", "table2", "view")
+_TELLING = (
+    "__main__.py",
+    "arguments.py",
+    "quoted.py",
+    "report.py",
+    "results.py",
+    "paper",
+    "study",
+    "table2",
+    "view",
+)
 """Modules and packages that tell, draw or compare, and change no plan and no run."""
 
 
