@@ -69,6 +69,7 @@ def test_costs_of_transport_are_of_equal_ways_from_rest_to_rest(tmp_path):
     assert {p.goal[0] for p in wheels} == {result.settings["goal_of_wheels_m"]}
     assert wheels[0].goal[0] == pytest.approx(feet.goal[0])
     found = by_key(result)
+    assert found["the shortest way is shorter than the longest by"].ours < 1.0
     assert (found["feet.cot"].ours, found["both.cot"].ours) == pytest.approx((0.6, 0.2))
     assert found["cot.improvement"].ours == pytest.approx(3.0)
     assert found["cot.reduction"].ours == pytest.approx(100 * 2 / 3)

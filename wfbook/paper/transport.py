@@ -65,11 +65,17 @@ def run(bench: Bench) -> Result:
     result.records.append(compared("transport.duration", SLOTS * SLOT_S))
     for case, (planned, runs) in found.items():
         result.records += _costs(case, planned, runs)
+    ways = [run.metrics["distance_m"] for _, runs in found.values() for run in runs]
+    if ways:
+        spread = 100.0 * (max(ways) - min(ways)) / max(ways)
+        result.records.append(measured("the shortest way is shorter than the longest by", spread, "%"))
     for suffix in ("", ", friction"):
         feet, both = found.get(f"feet{suffix}"), found.get(f"both{suffix}")
         if feet and both:
             result.records += _ratios(suffix, feet, both)
     result.notes = [
+        "Feet end short of their goal, because late steps are priced higher than early ones (eq. 31); wheels "
+        "are sent to where the feet ended.",
         "The paper takes its definition from elsewhere and does not repeat it, nor says over which distance: "
         "both definitions are given, and only their ratios can be compared.",
         "Its friction is not given either; IV-C does not say whether rolling costs anything.",
