@@ -123,12 +123,19 @@ def test_a_plan_is_run_once_for_each_seed(monkeypatch, tmp_path):
     def run(plan, delay, state, hold, seed, progress):
         ran.append((delay, state, hold, seed))
         meta = {"seed": seed, "state": state, "delay": delay}
-        return replace(small_run(), meta=meta, metrics={"distance_m": np.float64(seed), "cot_abs": np.nan})
+        metrics = {
+            "upright": seed == 0,
+            "fall_time_s": 0.7,
+            "cot_abs": np.nan,
+            "distance_m": np.float64(seed),
+        }
+        return replace(small_run(), meta=meta, metrics=metrics)
 
     monkeypatch.setattr(simulate, "run", run)
     bench = Bench(Store(tmp_path, "stamp"), Options(seeds=2, state="true"))
     runs = bench.execute(small_plan(), "flat")
     assert ran == [(0.009, "true", 1.0, 0), (0.009, "true", 1.0, 1)]
+    assert bench.troubles == ["flat: fell at 0.70 s, seed 1"]
     again = bench.execute(small_plan(), "another name")
     assert len(ran) == 2
     for one, other in zip(runs, again, strict=True):

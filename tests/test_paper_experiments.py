@@ -84,8 +84,19 @@ def test_a_fallen_robot_has_no_cost_of_transport(tmp_path):
     bench.execute = lambda plan, label: [execution(plan, seed, upright=False) for seed in range(2)]
     found = by_key(transport.run(bench))
     assert found["feet.cot"].ours is None
+    assert found["distance, feet only"].ours is None
     assert found["cot.improvement"].ours is None
     assert found["of 2 runs upright to the end, feet only"].ours == 0
+
+    def one_falls(plan, label):
+        fallen = int(plan.end_effector.any())  # with wheels another one than on feet
+        return [execution(plan, seed, 1.0 + seed, upright=seed != fallen) for seed in range(3)]
+
+    bench.execute = one_falls
+    found = by_key(transport.run(bench))
+    assert found["feet.cot"].low == 2.0
+    assert found["both.cot"].low == 1.0
+    assert found["cot.improvement"].ours == found["cot.improvement"].high == 1.0, "of the same seed"
 
 
 @pytest.mark.parametrize("missing", ["feet", "both"])

@@ -103,7 +103,7 @@ class Bench:
         options: of all experiments.
         show: called now and then with a line of text.
         head: what the lines begin with.
-        troubles: what could not be planned, a sentence each.
+        troubles: what could not be planned, and who fell, a sentence each.
     """
 
     store: Store
@@ -167,6 +167,11 @@ class Bench:
             runs.append(
                 self.store.get("run", definition, make, Execution.load, lambda run, path: run.save(path))
             )
+        self.troubles += [
+            f"{label}: fell at {run.metrics['fall_time_s']:.2f} s, seed {run.meta['seed']}"
+            for run in runs
+            if not run.metrics["upright"]
+        ]
         return runs
 
     def time(self, asked: Trial, label: str) -> dict[str, Any]:

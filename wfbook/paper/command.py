@@ -68,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Do the experiments; an interrupt keeps what was found.
 
     Returns:
-        0 if everything was planned, else 1.
+        0 if everything was planned and nobody fell, else 1.
 
     Raises:
         CommandError: wrong input, or interrupted with something found.
