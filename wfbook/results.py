@@ -1,8 +1,11 @@
 """Result folders that appear whole or not at all."""
 
+import contextlib
 import os
 import shutil
+import signal
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -77,4 +80,16 @@ class ResultFolder:
 
     def _remove_parents(self) -> None:
         while self._made:
-            self._made.pop().rmdir()
+            with contextlib.suppress(OSError):  # something else was put there meanwhile
+                self._made.pop().rmdir()
+
+
+@contextlib.contextmanager
+def undisturbed() -> Iterator[None]:
+    """Ignore interrupts while results are written, for the impatient interrupt twice."""
+    before = {kind: signal.signal(kind, signal.SIG_IGN) for kind in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for kind, handler in before.items():
+            signal.signal(kind, handler)

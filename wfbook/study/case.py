@@ -26,7 +26,7 @@ TIMES = ("wall_time_s", "worker", "estimator_ms_median", "tick_ms_median", "tick
 """Columns that differ when a case is run again; all others are the same on the same machine."""
 
 _PACKAGES = ("daqp", "mujoco", "numpy", "osqp", "pin", "scipy")
-_NOT_SIMULATION = ("__main__", "arguments", "report", "results")
+_NOT_SIMULATION = ("__main__", "arguments", "quoted", "report", "results")
 _OF_STUDY = ("axes", "case", "ground")
 
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from wfbook.modes import END_EFFECTORS
+from wfbook.quoted import value
 from wfbook.table2 import trial
 from wfbook.table2.trial import Trial
 from wfbook.terrain import Terrain, flat, ramp
@@ -82,14 +83,14 @@ def cut(regions: int) -> Terrain:
 _DOWN = ramp(direction="down")
 
 ROWS = (
-    Row(flat(), 1, 5, 0.714),
-    Row(flat(), 1, 10, 4.637),
-    Row(flat(), 2, 5, 1.723),
-    Row(flat(), 2, 10, 673.58),
-    Row(_DOWN, 1, 5, 0.977),
-    Row(_DOWN, 1, 10, 204.37),
-    Row(_DOWN, 2, 5, 3.887),
-    Row(apart(_DOWN), 2, 5, 3.887),
+    Row(flat(), 1, 5, value("table2.1,1,5")),
+    Row(flat(), 1, 10, value("table2.1,1,10")),
+    Row(flat(), 2, 5, value("table2.1,2,5")),
+    Row(flat(), 2, 10, value("table2.1,2,10")),
+    Row(_DOWN, 1, 5, value("table2.3,1,5")),
+    Row(_DOWN, 1, 10, value("table2.3,1,10")),
+    Row(_DOWN, 2, 5, value("table2.3,2,5")),
+    Row(apart(_DOWN), 2, 5, value("table2.3,2,5")),
 )
 
 

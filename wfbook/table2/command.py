@@ -1,16 +1,14 @@
 """``python -m wfbook table2``: run the benchmark, keep what it found, tell and draw it."""
 
 import argparse
-import contextlib
 import json
-import signal
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from wfbook.arguments import FAILED, INTERRUPTED, OK, WRONG_INPUT, CommandError, number, result_folder, whole
 from wfbook.report import ProgressLine, plain
+from wfbook.results import undisturbed
 from wfbook.table2.benchmark import ROWS, Benchmark, Options
 from wfbook.table2.text import table
 
@@ -79,7 +77,7 @@ def run(arguments: argparse.Namespace) -> int:
             if not benchmark.finished:
                 raise
             code = stop.code if isinstance(stop, SystemExit) else INTERRUPTED
-        with _undisturbed():
+        with undisturbed():
             _write(folder.path, benchmark.report)
             folder.publish()
     report = plain(benchmark.report)
@@ -97,14 +95,3 @@ def _write(folder: Path, report: dict[str, Any]) -> None:
     text = json.dumps(plain(report), indent=1, allow_nan=False)
     (folder / "table2.json").write_text(text + "\n")
     (folder / "table2.png").write_bytes(benchmarks.table2(report).png())
-
-
-@contextlib.contextmanager
-def _undisturbed() -> Iterator[None]:
-    """Ignore interrupts while results are written, for the impatient interrupt twice."""
-    before = {kind: signal.signal(kind, signal.SIG_IGN) for kind in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield
-    finally:
-        for kind, handler in before.items():
-            signal.signal(kind, handler)

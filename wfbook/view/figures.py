@@ -47,20 +47,8 @@ def gait(plan: "Plan", title: str | None = None) -> Picture:
     """
     figure = Picture(8.0, 2.3)
     axes = figure.add_subplot()
-    tidy(axes)
-    axes.grid(axis="y", visible=False)
     edges = plan.t[0] + plan.slot_duration * np.arange(plan.slots + 1)
-    for leg, mode, start, stop in spans(plan_modes(plan.S, plan.end_effector)):
-        axes.barh(
-            leg,
-            edges[stop] - edges[start],
-            left=edges[start],
-            height=_BAR_HEIGHT,
-            color=MODE_COLOURS[mode],
-            gid=f"{LEGS[leg]} {MODE_NAMES[mode]}",
-        )
-    axes.set_yticks(range(len(LEGS)), LEGS)
-    axes.set_ylim(len(LEGS) - 0.5, -0.5)
+    draw_gait(axes, edges, plan_modes(plan.S, plan.end_effector))
     axes.set_xlim(edges[0], edges[-1])
     axes.set_xticks(edges)
     axes.xaxis.set_major_formatter("{x:.1f}")
@@ -71,6 +59,29 @@ def gait(plan: "Plan", title: str | None = None) -> Picture:
     handles = [Patch(color=colour, label=name) for colour, name in zip(MODE_COLOURS, MODE_NAMES, strict=True)]
     figure.legend(handles=handles, loc="outside right upper", frameon=False)
     return figure
+
+
+def draw_gait(axes: Any, edges: np.ndarray, modes: np.ndarray) -> None:
+    """Draw a bar for every stretch in which a leg keeps its mode.
+
+    Args:
+        axes: to draw in.
+        edges: ``(T+1,)`` times between which the modes hold.
+        modes: ``(L, T)``, 0 stands on its foot, 1 on its wheel, 2 swings.
+    """
+    tidy(axes)
+    axes.grid(axis="y", visible=False)
+    for leg, mode, start, stop in spans(modes):
+        axes.barh(
+            leg,
+            edges[stop] - edges[start],
+            left=edges[start],
+            height=_BAR_HEIGHT,
+            color=MODE_COLOURS[mode],
+            gid=f"{LEGS[leg]} {MODE_NAMES[mode]}",
+        )
+    axes.set_yticks(range(len(LEGS)), LEGS)
+    axes.set_ylim(len(LEGS) - 0.5, -0.5)
 
 
 def com_path(plan: "Plan", run: "Run | None" = None, polygons: bool = False) -> Picture:
