@@ -143,6 +143,16 @@ class Tracker:
         """Return the centres of the legs' ends in the plan's first posture, ``(4, 3)``."""
         return self.plan.p[0] + RADII[self._kinds][:, None] * self.footing.normals
 
+    def follow(self, plan: "Plan", slot: int) -> None:
+        """Go on with another plan, one delay before it differs from the present one.
+
+        Args:
+            plan: up to the slot as the present one; no leg swings on both sides of the slot's begin.
+            slot: the first in which it differs.
+        """
+        self.plan, self.flights = plan, swings_of(plan)
+        self.lean.follow(plan, slot)
+
     def update(
         self, t: float, robot: Go1Dynamics, touching: np.ndarray, forces: np.ndarray
     ) -> tuple[Reference, Ground]:
