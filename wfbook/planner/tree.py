@@ -188,7 +188,8 @@ class Tree:
 
         An exception that Python raises between two callbacks is printed by PySCIPOpt and lost.
         """
-        if threading.current_thread() is not threading.main_thread():
+        main = threading.current_thread() is threading.main_thread()
+        if not main or signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
             yield
             return
 
