@@ -24,6 +24,12 @@ from wfbook.tracking import Tracker, interpolate
 if TYPE_CHECKING:
     from wfbook.planner.plan import Plan
 
+_TRIFLE = 0.01
+"""Errors that are left to the controller: feet roll over their roundness by as much. A plan that ends at the
+limit of its stance would have no successor if each millimetre counted."""
+
+_SLOW = 0.02
+
 
 def expected_state(
     problem: Problem, plan: "Plan", slot: int, t: float, tracker: Tracker, robot: Go1Dynamics
@@ -48,6 +54,8 @@ def expected_state(
         duration = min((j + 1) * plan.slot_duration - t, plan.slot_duration)
         on_feet = bool(np.any((plan.S[:, j] == 0) & (plan.end_effector[:, j] == 0)))
         error, rate = _held(error, rate, duration, np.array([on_feet, True]))
+    error = error if np.linalg.norm(error) > _TRIFLE else np.zeros(2)
+    rate = rate if np.linalg.norm(rate) > _SLOW else np.zeros(2)
     position = planned.position.copy()
     position[:2] += error
     limits = problem.limits
@@ -62,8 +70,9 @@ def expected_state(
         place = (robot.centres[leg] - RADII[int(wheel)] * tracker.footing.normals[leg])[:2]
         if wheel:
             place[0] = planned.contacts[leg, 0] + error[0]
-        place = np.clip(place, reach[0][leg], reach[1][leg])
-        contacts[leg] = _on_ground(problem, int(tracker.footing.landed[leg]), place, wheel)
+        if np.linalg.norm(place - planned.contacts[leg, :2]) > _TRIFLE or error.any():
+            place = np.clip(place, reach[0][leg], reach[1][leg])
+            contacts[leg] = _on_ground(problem, int(tracker.footing.landed[leg]), place, wheel)
     return InitialState(position, speed, planned.angles, planned.rates, contacts, planned.swung, planned.slot)
 
 

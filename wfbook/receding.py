@@ -60,7 +60,7 @@ def run(
     window: int = 8,
     commit: int = 4,
     gap: float = 0.02,
-    budget: int = 60,
+    budget: int = 40,
     clock: Clock = "budget",
     goal: Callable[[float], tuple[float, float]] | None = None,
     **execution: Any,

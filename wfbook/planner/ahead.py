@@ -104,7 +104,7 @@ class Planner:
         self._answer: Answer | None = None
 
     def ask(self, problem: Problem, gaits: Sequence[Gait], gap: float, budget: int) -> None:
-        """Ask for a window (see :func:`plan_window`); without a second core this lasts as long as planning."""
+        """Ask for a window (see :func:`plan_window`); without a second core, planning is done here."""
         if self._worker is not None:
             self._worker.ask(problem, gaits, gap, budget)
         else:
