@@ -7,13 +7,14 @@ that will still be so a little later?
 - As long as a foot is on the ground, the controller brings the centre of mass back to the plan, as its
   gains have it (eq. 34).
 - Along x nothing holds a robot that stands on passive wheels alone: an error of its velocity stays, and moves
-  it on. Its wheels go with it.
+  it on. Its wheels go with it, and so does the plan (:mod:`wfbook.drift`).
 """
 
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from wfbook.drift import excess, pace_of
 from wfbook.go1 import RADII
 from wfbook.go1_dynamics import Go1Dynamics
 from wfbook.planner.problem import InitialState, Problem
@@ -47,13 +48,31 @@ def expected_state(
         robot: dynamics at the state that the robot knows.
     """
     planned = state_after(problem, plan, slot)
-    now = min(int((t + tracker.delay) / plan.slot_duration + 1e-2), slot - 1)
+    rho, now = problem.knots_per_slot, min(int((t + tracker.delay) / plan.slot_duration + 1e-2), slot - 1)
     com, velocity, _ = interpolate(plan, t)
     error, rate = (robot.com - com)[:2], (robot.com_velocity - velocity)[:2]
+    drift, pace = tracker.drift.offset[0], tracker.drift.pace
+    landings = np.zeros((problem.legs, 2))
     for j in range(now, slot):
-        duration = min((j + 1) * plan.slot_duration - t, plan.slot_duration)
+        after, end = rho * (j + 1), (j + 1) * plan.slot_duration
         on_feet = bool(np.any((plan.S[:, j] == 0) & (plan.end_effector[:, j] == 0)))
-        error, rate = _held(error, rate, duration, np.array([on_feet, True]))
+        way = plan.x[after, 0] - com[0]
+        if on_feet:
+            kept = (pace - 1.0) * np.array([plan.v[after, 0], 0.0])
+            error[0], drift = error[0] - drift, drift + (pace - 1.0) * way
+            error, rate = _held(error, rate - kept, end - t)
+            error[0], rate = error[0] + drift, rate + kept
+        else:
+            (_, across), (_, aside) = _held(error, rate, end - t)
+            error, rate = np.array([error[0] + (end - t) * rate[0], across]), np.array([rate[0], aside])
+            if excess(error[0] - drift):
+                drift += excess(error[0] - drift)
+                pace = pace_of(plan.v[after, 0] + rate[0], plan.v[after, 0])
+        for leg in np.flatnonzero(plan.S[:, j]):
+            later = np.flatnonzero(plan.S[leg, j + 1 :])
+            until = rho * (j + 1 + later[0]) if len(later) else plan.knots
+            landings[leg, 0] = drift + (pace - 1.0) * (plan.x[until] - plan.x[after])[0]
+        t, com = end, plan.x[after]
     error = error if np.linalg.norm(error) > _TRIFLE else np.zeros(2)
     rate = rate if np.linalg.norm(rate) > _SLOW else np.zeros(2)
     position = planned.position.copy()
@@ -65,9 +84,12 @@ def expected_state(
     speed[:2] = np.clip(speed[:2] + rate, least, most)
     reach = (position + problem.robot.reach_lower)[:, :2], (position + problem.robot.reach_upper)[:, :2]
     contacts = planned.contacts.copy()
-    for leg in np.flatnonzero(tracker.stance & ~plan.S[:, now:slot].any(axis=1)):
+    swinging = ~tracker.stance | plan.S[:, now:slot].any(axis=1)
+    for leg in range(problem.legs):
         wheel = bool(plan.end_effector[leg, slot - 1])
         place = (robot.centres[leg] - RADII[int(wheel)] * tracker.footing.normals[leg])[:2]
+        if swinging[leg]:
+            place = planned.contacts[leg, :2] + landings[leg]
         if wheel:
             place[0] = planned.contacts[leg, 0] + error[0]
         if np.linalg.norm(place - planned.contacts[leg, :2]) > _TRIFLE or error.any():
@@ -76,22 +98,14 @@ def expected_state(
     return InitialState(position, speed, planned.angles, planned.rates, contacts, planned.swung, planned.slot)
 
 
-def _held(
-    error: np.ndarray, rate: np.ndarray, duration: float, held: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return an error and its rate some time later, each ``(2,)``.
+def _held(error: np.ndarray, rate: np.ndarray, duration: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return an error and its rate some time later, each ``(2,)``, where the controller can act.
 
-    Args:
-        error: of the position.
-        rate: of the velocity.
-        duration: how much later.
-        held: ``(2,)`` bool, along which axes the controller can act. There the error goes back like that of a
-            critically damped pendulum, which the gains are close to.
+    The error goes back like that of a critically damped pendulum, which the gains are close to.
     """
     omega = np.sqrt(Gains().com_kp[:2])
     decay, pull = np.exp(-omega * duration), rate + omega * error
-    back = (error + pull * duration) * decay, (rate - omega * pull * duration) * decay
-    return np.where(held, back[0], error + duration * rate), np.where(held, back[1], rate)
+    return (error + pull * duration) * decay, (rate - omega * pull * duration) * decay
 
 
 def _on_ground(problem: Problem, landed: int, place: np.ndarray, wheel: bool) -> np.ndarray:

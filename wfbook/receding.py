@@ -168,7 +168,7 @@ class _Loop:
 
     def __call__(self, t: float, tracker: Tracker, robot: Go1Dynamics) -> "tuple[Plan, int] | None":
         """Return a plan to go on with if it is time for one (see :data:`wfbook.simulate.Continuation`)."""
-        if self._next is None or t < 0.0:
+        if self._next is None or t < self._began * self.problem.slot_duration:
             return None
         if self._question is None:
             self._ask(t, tracker, robot)

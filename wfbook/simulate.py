@@ -245,7 +245,7 @@ class _Execution:
             "in_contact": loads > 1.0,
             "end_effector": robot.end_effectors,
             "stance": ref.stance,
-            "com_ref": ref.com,
+            "com_ref": ref.com - tracker.drift.offset,
             "com_velocity_ref": ref.com_velocity,
             "p_ref": ref.ends + dynamics.contact_offsets(ground.normals, present),
             "solved": command.solved,
