@@ -65,6 +65,7 @@ def test_standing_carries_the_weight_and_turns_nothing(begun):
     rest = standing(p.begun(still, kinds, slots=2, beyond_reach=True), gait_of(plan).region[:, -1])
     np.testing.assert_allclose(rest.lam.sum(axis=1)[:, 2], p.robot.weight)
     np.testing.assert_allclose(rest.contact_torque, 0.0, atol=1e-9)
+    rest = rest.with_meta(objective=plan_checker.objective(rest), bound=0.0, gap=1.0)
     assert plan_checker.check(rest)[0] == []
     joined = stitched(plan, 5, rest)
     assert joined.slots == 7 and not joined.S[:, 5:].any()
@@ -93,7 +94,7 @@ def test_the_rest_of_a_plan_is_a_plan(begun):
     assert np.isfinite(kernel.price(gaits[:1])[0])
 
 
-@pytest.mark.parametrize("budget", [1, 30, 60])
+@pytest.mark.parametrize("budget", [1, 40])
 def test_what_a_budget_leaves_open_is_not_proven(budget):
     p = problem(5)
     best = solve(p, gap=1e-3).meta

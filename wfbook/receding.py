@@ -54,6 +54,10 @@ _LEAST = 2
 """Slots of the shortest window: one to swing, one to stand."""
 
 _ATTEMPTS = 3
+"""How often a robot that stands asks for a plan that there is not."""
+
+_EVENTS = ("late", "without_plan", "waited_slots")
+"""What a run's ``meta`` says of the windows: all but times, which differ from run to run."""
 
 
 def run(
@@ -110,10 +114,11 @@ def run(
     relaxed, polished = loop.executed()
     known = {name: polished.meta[name] for name in ("status", "objective", "bound", "gap", "nodes")}
     known |= {"solve_time_s": polished.meta["solve_time"], "replanning": loop.summary(result)}
-    options = {"window": window, "commit": commit, "gap": gap, "budget": int(budget)}
-    options["clock"] = clock if isinstance(clock, str) else "function"
-    known_run = {"metrics": result.metrics | known, "meta": result.meta | {"replanning": options}}
-    return replace(result, **known_run), relaxed, polished
+    events = {key: value for key, value in known["replanning"].items() if key in _EVENTS}
+    events |= {"window": window, "commit": commit, "gap": gap, "budget": int(budget)}
+    events["clock"] = clock if isinstance(clock, str) else "function"
+    run = replace(result, metrics=result.metrics | known, meta=result.meta | {"replanning": events})
+    return run, relaxed, polished
 
 
 @dataclass

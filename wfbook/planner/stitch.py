@@ -13,6 +13,7 @@ from wfbook.modes import END_EFFECTORS
 from wfbook.planner.extract import gait_of, plan_of
 from wfbook.planner.gait import Gait
 from wfbook.planner.plan import Plan
+from wfbook.planner.polish import torque_mismatch
 from wfbook.planner.problem import Problem
 
 _SERIES = ("x", "v", "theta", "omega", "p", "a", "alpha", "lam", "f", "U_plus", "U_minus", "c")
@@ -64,4 +65,5 @@ def standing(problem: Problem, region: np.ndarray) -> Plan:
     wheel = np.array([END_EFFECTORS.index(name) for name in problem.start_end_effectors])
     gait = Gait(*(np.repeat(m[:, None], problem.slots, axis=1) for m in (0 * wheel, wheel, region)))
     components = {name: list(np.moveaxis(array, -1, 0)) for name, array in values.items()}
-    return plan_of(problem, components, gait, {"stage": "polished"})
+    plan = plan_of(problem, components, gait, {"stage": "polished"})
+    return plan.with_meta(torque_mismatch_nm=torque_mismatch(plan).tolist())
