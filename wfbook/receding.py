@@ -65,7 +65,7 @@ def run(
     window: int = 8,
     commit: int = 4,
     gap: float = 0.02,
-    budget: int = 40,
+    budget: int = 30,
     clock: Clock = "budget",
     goal: Callable[[float], tuple[float, float]] | None = None,
     **execution: Any,
