@@ -14,7 +14,6 @@ ORDER = (
     "archive", "polygon", "terrain", "centroidal", "swing", "modes", "friction", "planner", "go1",
     "go1_dynamics", "reference", "qp", "wbc", "sensors", "leg_odometry", "estimator", "footing", "lean",
     "drift", "tracking", "runs", "simulate", "forecast", "receding", "view", "report", "results", "arguments",
-    "drift", "tracking", "runs", "simulate", "forecast", "receding", "view", "report", "results", "arguments",
     "table2", "study", "__main__",
 )  # fmt: skip
 """The modules and packages, helpers before the chapter that they serve."""
