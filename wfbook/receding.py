@@ -89,8 +89,9 @@ def run(
         The run and what was executed, joined from the windows: the relaxed and the polished plan. The run's
         ``metrics["replanning"]`` lists the windows: slots, goal, status, gap, budget spent, planning time
         (``planning_s``, and of a core ``planning_cpu_s``), the time there was (``available_s``), their ratio
-        ``share``, and how far from the plan before it the robot was expected (``correction_m``). It counts
-        those that were ``late`` and those ``without_plan``, and the ``waited_slots``.
+        ``share``, by how much planning took too long (``late_s``), and how far from the plan before it the
+        robot was expected (``correction_m``). It counts those that were ``late`` by the clock in use and
+        those ``without_plan``, and the ``waited_slots``.
 
     Raises:
         ValueError: an argument is wrong.
@@ -330,6 +331,7 @@ class _Loop:
             "planning_cpu_s": answer.cpu_time if answer else None,
             "available_s": there,
             "share": None if there is None else taken / max(there, 1e-9),
+            "late_s": None if there is None else max(taken - there, 0.0),
             "correction_m": question.correction,
         }
         known = plans[0].meta if plans else {}
