@@ -13,8 +13,8 @@ ROOT = Path(wfbook.__file__).parent
 ORDER = (
     "archive", "polygon", "terrain", "centroidal", "swing", "modes", "friction", "planner", "go1",
     "go1_dynamics", "reference", "qp", "wbc", "sensors", "leg_odometry", "estimator", "footing", "lean",
-    "tracking", "runs", "simulate", "view", "report", "results", "arguments", "quoted", "table2",
-    "study", "paper", "__main__",
+    "drift", "tracking", "runs", "simulate", "forecast", "receding", "view", "report", "results", "arguments",
+    "quoted", "table2", "study", "paper", "__main__",
 )  # fmt: skip
 """The modules and packages, helpers before the chapter that they serve."""
 

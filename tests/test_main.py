@@ -6,12 +6,13 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 
 import handmade
 import numpy as np
 import pytest
 
-from wfbook import planner, simulate
+from wfbook import planner, receding, simulate
 from wfbook.__main__ import main
 from wfbook.report import ProgressLine, plain
 from wfbook.results import ResultFolder
@@ -48,6 +49,7 @@ def no_work(monkeypatch):
 
     monkeypatch.setattr(planner, "solve_executable", begun)
     monkeypatch.setattr(simulate, "run", begun)
+    monkeypatch.setattr(receding, "run", begun)
     monkeypatch.setattr(trial, "run", begun)
 
 
@@ -115,6 +117,17 @@ WRONG = {
     "negative delay": (["run", "flat", "--delay-ms", "-1"], "--delay-ms: must be at least 0"),
     "negative seed": (["run", "flat", "--seed", "-1"], "--seed: must be at least 0"),
     "unknown state": (["run", "flat", "--state", "guessed"], "'guessed'"),
+    "search time while moving": (
+        ["run", "flat", "--replan", "--time-limit", "3"],
+        "--time-limit has no effect",
+    ),
+    "big-M while moving": (
+        ["run", "flat", "--replan", "--formulation", "paper"],
+        "--formulation has no effect",
+    ),
+    "clock without replanning": (["run", "flat", "--clock", "wall"], "no effect without --replan"),
+    "unknown clock": (["run", "flat", "--replan", "--clock", "sun"], "'sun'"),
+    "plan and replanning": (["run", "--plan", "gone.npz", "--replan"], "--replan has no effect with --plan"),
     "missing plan file": (["run", "--plan", "gone.npz"], "'gone.npz': No such file"),
     "plan and slots": (["run", "--plan", "gone.npz", "--slots", "3"], "--slots has no effect with --plan"),
     "plan and wheels": (["run", "--plan", "gone.npz", "--feet-only"], "--feet-only has no effect"),
@@ -428,3 +441,35 @@ def test_an_interrupted_search_goes_on_with_its_incumbent(patience, tmp_path):
     assert metrics["status"] == "interrupted"
     assert metrics["bound"] < metrics["objective"]
     assert {path.name for path in (tmp_path / "runs" / "flat").iterdir()} == FILES
+
+
+def test_replanning_leaves_the_same_files(capsys, monkeypatch, plan, recorded):
+    asked = {}
+    window = {"slots": [0, 1], "status": "optimal", "planning_s": 0.3}
+    told = {"late": 1, "without_plan": 2, "planning_s_median": 0.5, "share_max": 0.8, "windows": [window] * 3}
+
+    def run(problem, **options):
+        asked.update(options, problem=problem)
+        metrics = recorded.metrics | {"replanning": told, "status": "replanned"}
+        return replace(recorded, metrics=metrics), plan.with_meta(stage="relaxed"), plan
+
+    monkeypatch.setattr(receding, "run", run)
+    words = ["run", "flat", "--replan", "--slots", "20", "--clock", "wall", "--seed", "3", "--out", "here"]
+    assert main(words) == 0
+    assert everything(Path("here")) == FILES
+    assert asked["problem"].slots == 20
+    assert (asked["clock"], asked["gap"], asked["seed"]) == ("wall", 0.02, 3)
+    table = capsys.readouterr().out
+    assert "3 windows, 1 late, 2 without a plan; 0.50 s median, at most 80 %" in table
+    assert json.loads(Path("here/metrics.json").read_text())["replanning"]["late"] == 1
+
+
+def test_replanning_that_finds_no_plan_is_one_line(capsys, monkeypatch):
+    def run(problem, **options):
+        raise planner.NoPlanError("no plan found for the first window within its budget")
+
+    monkeypatch.setattr(receding, "run", run)
+    assert main(["run", "flat", "--replan"]) == 1
+    assert capsys.readouterr().err.splitlines()[-1] == (
+        "wfbook: no plan found for the first window within its budget"
+    )

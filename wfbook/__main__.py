@@ -46,8 +46,12 @@ PLANNING = {
     "formulation": "tight",
     "gap": 1e-3,
     "time_limit": 25.0,
+    "replan": False,
+    "clock": "budget",
 }
 """Options of planning and their defaults; no goal means ``GOAL_PER_SLOT`` ahead for each slot."""
+REPLAN_GAP = 0.02
+"""Of windows that are planned while the robot moves; the default of ``--gap`` then."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -99,6 +103,17 @@ def _parser() -> argparse.ArgumentParser:
     planning.add_argument(
         "--time-limit", type=number(0.0, above=True), metavar="S", help="of the search (25 s)"
     )
+    planning.add_argument(
+        "--replan",
+        action="store_true",
+        default=None,
+        help="plan ahead in windows while the robot moves, from where it is",
+    )
+    planning.add_argument(
+        "--clock",
+        choices=("budget", "wall"),
+        help="with --replan: plans are there in time (budget), or when they are (wall)",
+    )
     planning.add_argument("--plan", metavar="FILE", help="execute this plan file instead of planning")
     execution = run.add_argument_group("execution")
     execution.add_argument("--delay-ms", type=whole(0), default=9, help="torque delay (9 ms)")
@@ -134,11 +149,14 @@ def _run(arguments: argparse.Namespace) -> int:
     target = arguments.out or Path("runs") / file_name(name)
     with contextlib.ExitStack() as stack:
         folder = stack.enter_context(result_folder(target, FILES))
-        load("wfbook.simulate", "wfbook.view.figures", "wfbook.view.replay")
+        load("wfbook.receding", "wfbook.view.figures", "wfbook.view.replay")
         relaxed = None
-        if plan is None:
-            relaxed, plan = _planned(problem, arguments)
-        run = _executed(plan, arguments)
+        if problem is not None and arguments.replan:
+            relaxed, plan, run = _replanned(problem, arguments)
+        else:
+            if plan is None:
+                relaxed, plan = _planned(problem, arguments)
+            run = _executed(plan, arguments)
         metrics = _write(folder.path, relaxed, plan, run)
         folder.publish()
     print(json.dumps(metrics, indent=1) if arguments.json else summary_table(metrics, folder.target))
@@ -173,6 +191,13 @@ def _problem(arguments: argparse.Namespace) -> "Problem":
         raise CommandError(f"TERRAIN is missing: one of {known}, or a file ending in .json", WRONG_INPUT)
     with wrong_input():
         terrain = ground.named_or_file(arguments.terrain)
+    unused = ("formulation", "time_limit") if arguments.replan else ("clock",)
+    for option in unused:
+        if getattr(arguments, option) is not None:
+            how = "with" if arguments.replan else "without"
+            raise CommandError(f"--{option.replace('_', '-')} has no effect {how} --replan", WRONG_INPUT)
+    if arguments.replan and arguments.gap is None:
+        arguments.gap = REPLAN_GAP
     for option, default in PLANNING.items():
         if getattr(arguments, option) is None:
             setattr(arguments, option, default)
@@ -207,19 +232,42 @@ def _planned(problem: "Problem", arguments: argparse.Namespace) -> "tuple[Plan, 
             raise CommandError(" ".join(str(error).split()), FAILED) from None
 
 
+def _replanned(problem: "Problem", arguments: argparse.Namespace) -> "tuple[Plan, Plan, Run]":
+    """Plan ahead while the robot moves.
+
+    Returns:
+        The relaxed plan and the polished one, as they were executed, and the run.
+    """
+    from wfbook import planner, receding
+
+    with ProgressLine(sys.stderr) as line:
+        line.show("planning the first window")
+        try:
+            run, relaxed, plan = receding.run(
+                problem, gap=arguments.gap, clock=arguments.clock, **_execution(arguments, line)
+            )
+        except (planner.InfeasibleError, planner.NoPlanError) as error:
+            raise CommandError(" ".join(str(error).split()), FAILED) from None
+    return relaxed, plan, run
+
+
 def _executed(plan: "Plan", arguments: argparse.Namespace) -> "Run":
     from wfbook import simulate
 
     # A plan from elsewhere may be well-formed and yet ask for what the robot can't do.
     given = wrong_input() if arguments.plan else contextlib.nullcontext()
     with given, ProgressLine(sys.stderr) as line:
-        return simulate.run(
-            plan,
-            delay=arguments.delay_ms / 1000.0,
-            state=arguments.state,
-            seed=arguments.seed,
-            progress=lambda now, end: line.show(f"simulating {now:5.2f} of {end:.2f} s"),
-        )
+        return simulate.run(plan, **_execution(arguments, line))
+
+
+def _execution(arguments: argparse.Namespace, line: ProgressLine) -> dict[str, Any]:
+    """Return the options of an execution."""
+    return {
+        "delay": arguments.delay_ms / 1000.0,
+        "state": arguments.state,
+        "seed": arguments.seed,
+        "progress": lambda now, end: line.show(f"simulating {now:5.2f} of {end:.2f} s"),
+    }
 
 
 def _write(folder: Path, relaxed: "Plan | None", plan: "Plan", run: "Run") -> dict[str, Any]:

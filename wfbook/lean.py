@@ -34,6 +34,18 @@ class Lean:
         self._slot = plan.slot_duration
         self._angles = np.array([_angles(contacts) for contacts in places])
 
+    def follow(self, plan: "Plan", slot: int) -> None:
+        """Go on with another plan from a slot on.
+
+        The next slope is foreseen by a slot: there it stays as it was, so that the trunk does not jump.
+
+        Args:
+            plan: as for the class; up to the slot as the one before.
+            slot: the first in which it differs.
+        """
+        kept = self._angles[: slot + 2]
+        self._angles = np.vstack([kept, Lean(plan)._angles[len(kept) :]])
+
     def at(self, t: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the trunk's orientation and angular velocity at a time since the plan's start.
 

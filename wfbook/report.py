@@ -87,6 +87,16 @@ def summary_table(metrics: dict[str, Any], folder: Path) -> str:
     }
     if metrics["status"] is None:  # a plan that no search made
         del rows["search"], rows["objective"]
+    if (ahead := metrics.get("replanning")) is not None:
+        del rows["objective"]
+        rows["search"] = (
+            f"{len(ahead['windows'])} windows, {ahead['late']} late, {ahead['without_plan']} without a plan"
+        )
+        if ahead["share_max"] is not None:
+            rows["search"] += (
+                f"; {ahead['planning_s_median']:.2f} s median, at most {100 * ahead['share_max']:.0f} % "
+                "of the time there was"
+            )
     return "\n".join(f"{label:18} {text}" for label, text in rows.items())
 
 

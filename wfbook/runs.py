@@ -19,6 +19,7 @@ FORMAT = 4
 """Version of the run file; a file of another version is refused."""
 
 TIMINGS = ("solve_time_s", "estimator_ms_median", "tick_ms_median", "tick_ms_p99", "real_time_factor")
+TIMINGS += ("replanning",)
 """Metrics that differ from run to run of one seed; they are not in the run file, which does not."""
 
 

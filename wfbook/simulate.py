@@ -28,6 +28,10 @@ if TYPE_CHECKING:
 
 __all__ = ["Run", "run"]
 
+Continuation = Callable[[float, Tracker, Go1Dynamics], tuple["Plan", int] | None]
+"""From time, tracker and what the robot knows of itself: a plan to go on with, and the first slot in which it
+differs from the present one; None to go on as before."""
+
 SETTLE = 0.5
 """Time in which the robot comes to rest in the plan's first posture."""
 
@@ -49,6 +53,7 @@ def run(
     wheel_model: str = "encoder",
     noise: SensorNoise | None = None,
     real_terrain: "Terrain | None" = None,
+    continuation: Continuation | None = None,
 ) -> Run:
     """Execute a plan: settle in its first posture, follow it, stand still at its end.
 
@@ -70,6 +75,7 @@ def run(
         noise: of the simulated sensors, which the estimator does not know: it trusts the usual ones.
         real_terrain: on which the robot walks, if not on the one of the plan, which is all that the
             controller and the estimator know.
+        continuation: asked after every tick for a plan to go on with (see :mod:`wfbook.receding`).
 
     Raises:
         ValueError: an argument is out of range, or the plan's first posture is out of reach.
@@ -85,7 +91,7 @@ def run(
     robot = Go1(real_terrain or plan.terrain, joint_friction, trunk_mass_scale)
     execution = _Execution(plan, delay, robot, Sensors(seed, noise), seed, push, gains, estimator)
     execution.meta |= {"joint_friction": joint_friction, "trunk_mass_scale": trunk_mass_scale}
-    return execution.run(hold, progress)
+    return execution.run(hold, progress, continuation)
 
 
 class _Execution:
@@ -136,16 +142,22 @@ class _Execution:
             },
         }
 
-    def run(self, hold: float, progress: Callable[[float, float], None] | None) -> Run:
+    def run(
+        self,
+        hold: float,
+        progress: Callable[[float, float], None] | None,
+        continuation: Continuation | None,
+    ) -> Run:
         """Simulate to the end or to the fall, and return the log."""
-        plan_duration = float(self.plan.t[-1] - self.plan.t[0])
-        steps = round((SETTLE + plan_duration + hold) / self.step_time)
         waiting: deque[np.ndarray] = deque()
-        fall_time, began = None, time.perf_counter()
-        for step in range(steps + 1):
+        fall_time, began, step = None, time.perf_counter(), -1
+        while step < (steps := self._steps(hold)):
+            step += 1
             t = step * self.step_time - SETTLE
             if step % _CONTROL_STEPS == 0:
                 command = self._tick(t)
+                if continuation is not None:
+                    began += self._go_on(t, continuation)
                 if not waiting:
                     waiting.extend([command] * round(self.delay / self.step_time))
             waiting.append(command)
@@ -184,6 +196,19 @@ class _Execution:
             times=times,
         )
 
+    def _steps(self, hold: float) -> int:
+        """Return how many milliseconds there are to simulate, as far as is known."""
+        return round((SETTLE + float(self.plan.t[-1] - self.plan.t[0]) + hold) / self.step_time)
+
+    def _go_on(self, t: float, continuation: Continuation) -> float:
+        """Follow another plan if there is one, and return the wall time that it took to ask."""
+        asked = time.perf_counter()
+        found = continuation(t, self.tracker, self.dynamics)
+        if found is not None:
+            self.plan, slot = found
+            self.tracker.follow(self.plan, slot)
+        return time.perf_counter() - asked
+
     def _tick(self, t: float) -> np.ndarray:
         """Run the controller once, log, and return the torques it commands."""
         robot, dynamics, tracker, truth = self.robot, self.dynamics, self.tracker, self.truth
@@ -220,7 +245,7 @@ class _Execution:
             "in_contact": loads > 1.0,
             "end_effector": robot.end_effectors,
             "stance": ref.stance,
-            "com_ref": ref.com,
+            "com_ref": ref.com - tracker.drift.offset,
             "com_velocity_ref": ref.com_velocity,
             "p_ref": ref.ends + dynamics.contact_offsets(ground.normals, present),
             "solved": command.solved,

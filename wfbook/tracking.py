@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from wfbook.drift import Drift
 from wfbook.footing import Footing
 from wfbook.go1 import FOOT_RADIUS, RADII, calf_pitch, nominal
 from wfbook.go1_dynamics import GRAVITY, Go1Dynamics, rotation
@@ -120,11 +121,12 @@ class Tracker:
         lifted: how many flights each leg has begun, ``(4,)``.
         footing: what is under each leg.
         lean: the trunk's orientation.
+        drift: how far the plan goes along with a robot that rolls away.
     """
 
     def __init__(self, plan: "Plan", delay: float) -> None:
         self.plan, self.delay = plan, delay
-        self.flights, self.lean = swings_of(plan), Lean(plan)
+        self.flights, self.lean, self.drift = swings_of(plan), Lean(plan), Drift()
         self.stance = np.ones(4, bool)
         self.lifted = np.zeros(4, int)
         self._from = np.zeros((4, 3))
@@ -142,6 +144,17 @@ class Tracker:
     def start_ends(self) -> np.ndarray:
         """Return the centres of the legs' ends in the plan's first posture, ``(4, 3)``."""
         return self.plan.p[0] + RADII[self._kinds][:, None] * self.footing.normals
+
+    def follow(self, plan: "Plan", slot: int) -> None:
+        """Go on with another plan, one delay before it differs from the present one.
+
+        Args:
+            plan: up to the slot as the present one; no leg swings on both sides of the slot's begin.
+            slot: the first in which it differs.
+        """
+        self.plan, self.flights = plan, swings_of(plan)
+        self.lean.follow(plan, slot)
+        self.drift.end_at(slot * plan.slot_duration)
 
     def update(
         self, t: float, robot: Go1Dynamics, touching: np.ndarray, forces: np.ndarray
@@ -163,6 +176,8 @@ class Tracker:
         ahead = interpolate(self.plan, t + self.delay)[2]
         for leg in range(4):
             self._advance(leg, t, bool(touching[leg]), ends[leg], robot.centre_velocity[leg])
+        rolling, normal = bool(self._kinds[self.stance].all()), self.footing.normals.mean(axis=0)
+        com, velocity, ahead = self.drift.update(t, (com, velocity, ahead), robot, rolling, normal)
         p = np.zeros((4, 3))
         for leg in np.flatnonzero(self.stance):
             p[leg] = self._standing(leg, t, com)
@@ -307,13 +322,16 @@ class Tracker:
         It is a centimetre and more where the robot walks past the foot. Near an edge the foot lands so much
         before its place that it does not roll over.
         """
-        later = self.flights[leg][self.lifted[leg] :]
-        until = later[0].start if later else self.plan.t[-1] - self.plan.t[0]
         pitches = []
-        for t in (flight.end, until):
+        for t in (flight.end, self._stance_end(leg)):
             R_wb = rotation(self.lean.at(t)[0])
             pitches.append(calf_pitch(flight.target - interpolate(self.plan, t)[0] - R_wb @ self._hips[leg]))
         return FOOT_RADIUS * (pitches[1] - pitches[0])
+
+    def _stance_end(self, leg: int) -> float:
+        """Return until when a leg stands that lands next."""
+        later = self.flights[leg][self.lifted[leg] :]
+        return later[0].start if later else self.plan.t[-1] - self.plan.t[0]
 
     def _duration(self, leg: int, flight: Swing) -> float:
         """Return the time from a leg's actual lift-off to its planned landing."""
@@ -358,6 +376,8 @@ class Tracker:
             growth = np.exp(omega * (flight.start + flight.duration - t))
             shift = across * (across @ error) * growth
             shift *= min(1.0, _FARTHEST_ASIDE / max(np.linalg.norm(shift), 1e-9))
+            until = flight.end if flight.kind else self._stance_end(leg)
+            shift += self.drift.after(interpolate(self.plan, until)[0][0] - interpolate(self.plan, t)[0][0])
             region = self.plan.terrain.regions[flight.region]
             shift *= min(_room(region, point, shift) for point in self._extremes[leg])
             rise = -(region.normal[:2] @ shift) / region.normal[2]

@@ -7,7 +7,7 @@ the fast one. :mod:`.conic` compiles them for Clarabel, :mod:`.presolve` removes
 :mod:`.gait`, :mod:`.boxes` and :mod:`.symmetry` are the logic of gaits. :mod:`.kernel` bounds and prices, on
 two cores with :mod:`.worker`; :mod:`.gaits` guesses, :mod:`.branching` splits, :mod:`.tree` lets SCIP search
 by its :mod:`.plugins`. :mod:`.extract` reads the solution, :mod:`.polish` makes it true, :mod:`.plan` keeps
-it, :mod:`.windows` plans far.
+it, :mod:`.windows` plans far, :mod:`.ahead` in another process, and :mod:`.stitch` joins the plans.
 
 :mod:`.explain` says why there is nothing to find: :mod:`.elastic` answers, on a :mod:`.wide` problem and with
 :mod:`.feasibility`, what would be possible without some limits; :mod:`.reasons` and :mod:`.neighbours` name

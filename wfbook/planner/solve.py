@@ -133,6 +133,7 @@ class Search:
         progress: Callable[[Progress], None] | None = None,
         gaits: Sequence[Gait] = (),
         explain: bool = True,
+        budget: float = np.inf,
     ):
         """Build and compile both programs.
 
@@ -143,6 +144,7 @@ class Search:
             progress: called now and then.
             gaits: to be priced first, whatever the time limit.
             explain: say why, should there be no plan; that can take longer than to find it out.
+            budget: of all searches together, in relaxations and exact programs.
         """
         check_start(problem)
         begin = time.perf_counter()
@@ -150,7 +152,7 @@ class Search:
         self.explain = explain
         self.kernel = Kernel(problem, min(CLOSE, 0.2 * gap))
         self.build_time = time.perf_counter() - begin
-        self._left = time_limit
+        self._left, self._budget = time_limit, budget
         self._spent, self._nodes = 0.0, 0
 
     def exclude(self, plan: Plan) -> None:
@@ -167,9 +169,10 @@ class Search:
         kernel.pruned = np.inf
         kernel.relax()
         kernel.open()
-        tree = Tree(kernel, self.gap, self._left, self.progress, self.gaits)
+        tree = Tree(kernel, self.gap, self._left, self.progress, self.gaits, self._budget)
         status, bound, nodes = tree.run()
         self._left = max(self._left - tree.elapsed, 1e-3)
+        self._budget = max(self._budget - tree.spent, 1)
         self._spent, self._nodes = self._spent + tree.elapsed, self._nodes + nodes
         if status == "infeasible":
             rejected = len(kernel.excluded)
@@ -179,7 +182,7 @@ class Search:
                 raise KeyboardInterrupt
             if status == "unclear":
                 raise NoPlanError("no plan found, but for some gaits the solver could not tell")
-            raise NoPlanError(f"no plan found within {self._spent:.1f} s")
+            raise NoPlanError(f"no plan found within {self._spent:.1f} s and {kernel.qps} relaxations")
         self._bound, self._root_bound, self._status = bound, tree.root_bound, status
         return self._plan(tree.best[1])
 

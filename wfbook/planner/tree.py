@@ -51,6 +51,8 @@ class Tree:
         time_limit: in seconds, for the search.
         progress: called with a :class:`Progress` now and then.
         gaits: to be priced before anything else, whatever the time limit.
+        budget: of relaxations and exact programs, for the search. Unlike the time limit it ends all runs
+            of a problem at the same place.
         best: cost and gait of the incumbent.
     """
 
@@ -59,6 +61,7 @@ class Tree:
     time_limit: float
     progress: Callable[[Progress], None] | None = None
     gaits: Sequence[Gait] = ()
+    budget: float = np.inf
     best: tuple[float, Gait] | None = None
     root_bound: float = -np.inf
     error: BaseException | None = None
@@ -66,11 +69,20 @@ class Tree:
     dual_bound: float = np.inf
     _begin: float = field(default_factory=time.perf_counter)
     _shown: float = -np.inf
+    _before: int = field(init=False)
+
+    def __post_init__(self):
+        self._before = self.kernel.qps + self.kernel.leaves
 
     @property
     def elapsed(self) -> float:
         """Time since the search began."""
         return time.perf_counter() - self._begin
+
+    @property
+    def spent(self) -> int:
+        """Relaxations and exact programs solved since the search began."""
+        return self.kernel.qps + self.kernel.leaves - self._before
 
     @property
     def incumbent(self) -> float:
@@ -86,8 +98,9 @@ class Tree:
         """Search.
 
         Returns:
-            Status ("optimal", "infeasible", "unclear", "time limit" or "interrupted"), proven bound, node
-            count. It is unclear where the tree is exhausted, but a solver had no answer for some leaf.
+            Status ("optimal", "infeasible", "unclear", "time limit", "budget" or "interrupted"), proven
+            bound, node count. It is unclear where the tree is exhausted, but a solver had no answer for
+            some leaf.
         """
         with self._interruptible():
             root = self.kernel.boxes.root()
@@ -109,7 +122,9 @@ class Tree:
             return "infeasible", np.inf, nodes
         if self.best is not None and self.incumbent - bound <= self.gap * self.incumbent * (1 + 1e-9):
             return "optimal", bound, nodes
-        return "unclear" if exhausted else "time limit", bound, nodes
+        if exhausted:
+            return "unclear", bound, nodes
+        return "budget" if self.spent >= self.budget else "time limit", bound, nodes
 
     def _prepare(self) -> dict[str, Any]:
         """Find a first plan, and narrow the search to what is better."""
@@ -123,7 +138,7 @@ class Tree:
     def _late(self) -> bool:
         """Tell whether it is time to stop."""
         self.report()
-        return self.error is not None or self.elapsed > self.time_limit
+        return self.error is not None or self.elapsed > self.time_limit or self.spent >= self.budget
 
     def _branch(self) -> int:
         """Let SCIP search; return how many nodes it took."""
@@ -173,7 +188,8 @@ class Tree:
 
         An exception that Python raises between two callbacks is printed by PySCIPOpt and lost.
         """
-        if threading.current_thread() is not threading.main_thread():
+        main = threading.current_thread() is threading.main_thread()
+        if not main or signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
             yield
             return
 
@@ -228,13 +244,15 @@ class Tree:
     def guarded(
         self, action: Callable[[], dict[str, Any]], otherwise: Any = SCIP_RESULT.DIDNOTRUN
     ) -> dict[str, Any]:
-        """Run a callback's body; SCIP would print and ignore an exception, so stop it and raise later.
+        """Run a callback's body, unless the budget is spent.
+
+        SCIP would print and ignore an exception, so stop it and raise later.
 
         Args:
             action: the body.
             otherwise: what to answer from then on; each kind of callback has its own that is harmless.
         """
-        if self.error is None:
+        if self.error is None and (self.model is None or self.spent < self.budget):
             try:
                 return action()
             except BaseException as error:

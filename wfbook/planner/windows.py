@@ -63,11 +63,7 @@ def solve_windows(
     Raises:
         As for :func:`wfbook.planner.solve_executable`.
     """
-    for name, value, least in (("window", window, 2), ("commit", commit, 1)):
-        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-            raise ValueError(f"{name}: {value!r} is not a whole number of at least {least}")
-    if commit >= window:
-        raise ValueError(f"commit: {commit} is not less than the window's {window} slots")
+    check_windows(window, commit)
     check_limits(gap, time_limit)
     check_start(problem)
     begin = time.perf_counter()
@@ -131,7 +127,9 @@ class _Windows:
         state, kinds = problem.start_state, problem.start_end_effectors
         while True:
             size = min(self.window, problem.slots - begin)
-            part = self._part(state, kinds, size, begin + size == problem.slots)
+            part = window_problem(problem, state, size, begin + size == problem.slots)
+            if self.gait is not None:
+                part = part.begun(state, kinds)
             try:
                 relaxed, polished = self._solve(part, begin)
             except KeyboardInterrupt:
@@ -149,7 +147,7 @@ class _Windows:
             if self.interrupted or self.end == problem.slots:
                 return
             begin += self.commit
-            state = _state_after(part, polished, self.commit)
+            state = state_after(part, polished, self.commit)
             kinds = [END_EFFECTORS[e] for e in polished.end_effector[:, self.commit - 1]]
 
     def found(self, plan: Plan) -> bool:
@@ -157,19 +155,6 @@ class _Windows:
         if self.gait is None:
             return False
         return gait_of(plan).key == self.gait.key
-
-    def _part(self, state: InitialState, kinds: Any, size: int, last: bool) -> Problem:
-        """Return the problem of a window."""
-        problem = self.problem
-        if last:
-            goal, rest = problem.goal, problem.final_stance
-        else:
-            goal, rest = intermediate_goal(problem, state, size), True
-        changes = {"slots": size, "goal": goal, "final_stance": rest, "beyond_reach": True}
-        changes["goal_tolerance"] = problem.goal_tolerance if last else None
-        if self.gait is None:
-            return replace(problem, **changes)
-        return problem.begun(state, kinds, **changes)
 
     def _solve(self, part: Problem, begin: int) -> tuple[Plan, Plan]:
         """Search one window."""
@@ -201,6 +186,31 @@ class _Windows:
         keys = ("objective", "bound", "gap", "status", "nodes", "solve_time", "rejected_gaits")
         record = {"slots": [begin, begin + part.slots], "goal": list(map(float, part.goal))}
         self.records.append(record | {key: meta.get(key) for key in keys})
+
+
+def check_windows(window: int, commit: int) -> None:
+    """Refuse numbers of slots that are no window and no part of one."""
+    for name, value, least in (("window", window, 2), ("commit", commit, 1)):
+        if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+            raise ValueError(f"{name}: {value!r} is not a whole number of at least {least}")
+    if commit >= window:
+        raise ValueError(f"commit: {commit} is not less than the window's {window} slots")
+
+
+def window_problem(problem: Problem, state: InitialState, slots: int, last: bool) -> Problem:
+    """Return the problem of a window, but for the state in which it begins (:meth:`.Problem.begun`).
+
+    Args:
+        problem: the whole.
+        state: in which the window begins.
+        slots: of the window.
+        last: whether it is to end as the whole does; any other ends at rest, towards the goal.
+    """
+    if last:
+        goal, rest, near = problem.goal, problem.final_stance, problem.goal_tolerance
+    else:
+        goal, rest, near = intermediate_goal(problem, state, slots), True, None
+    return replace(problem, slots=slots, goal=goal, final_stance=rest, beyond_reach=True, goal_tolerance=near)
 
 
 def intermediate_goal(problem: Problem, state: InitialState, slots: int) -> tuple[float, float]:
@@ -235,7 +245,7 @@ def intermediate_goal(problem: Problem, state: InitialState, slots: int) -> tupl
     return tuple(map(float, here + reach * along))
 
 
-def _state_after(problem: Problem, plan: Plan, slots: int) -> InitialState:
+def state_after(problem: Problem, plan: Plan, slots: int) -> InitialState:
     """Return the state of a window's plan after some slots.
 
     Solvers leave limits exceeded by their tolerance, which a start may not: it is moved back inside.

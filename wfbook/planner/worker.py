@@ -29,6 +29,7 @@ class Worker:
         process = context.Process(target=_serve, args=(far, self._pipe, function), daemon=True)
         process.start()
         far.close()
+        self._process = process
         self._close = weakref.finalize(self, _stop, self._pipe, process)
 
     def ask(self, *arguments: Any) -> None:
@@ -39,14 +40,28 @@ class Worker:
         """Wait for the call's result."""
         return self._pipe.recv()
 
+    def answered(self, timeout: float) -> bool:
+        """Wait for the call's result for some seconds, and tell whether it is there."""
+        return self._pipe.poll(timeout)
+
     def close(self) -> None:
-        """End the process."""
+        """End the process, once its call is done."""
+        self._close()
+
+    def kill(self) -> None:
+        """End the process at once, in the middle of its call."""
+        self._process.kill()
         self._close()
 
 
 def available() -> bool:
-    """Tell whether there is a second core, and a system (Linux) on which a process can be forked safely."""
-    return hasattr(os, "sched_getaffinity") and len(os.sched_getaffinity(0)) > 1
+    """Tell whether there is a second core, and a system (Linux) on which a process can be forked safely.
+
+    A worker has no worker of its own: the other core is busy with what started it.
+    """
+    if multiprocessing.current_process().daemon or not hasattr(os, "sched_getaffinity"):
+        return False
+    return len(os.sched_getaffinity(0)) > 1
 
 
 def _serve(pipe: Connection, theirs: Connection, function: Callable[..., Any]) -> None:
