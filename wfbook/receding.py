@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 Clock = str | Callable[[int, float], float]
 
-_FIRST = 4
+_FIRST = 8
 """How much more may be spent on a window that begins at rest: there is no gait to go on with, and the robot
 can wait."""
 
@@ -77,7 +77,7 @@ def run(
         window: number of slots that are planned at once.
         commit: number of slots of a window that are executed before the next one takes over.
         gap: at which the search of a window ends.
-        budget: of relaxations and exact programs for a window; one that begins at rest has four times as
+        budget: of relaxations and exact programs for a window; one that begins at rest has eight times as
             much.
         clock: "budget", "wall", or a function from a window's number and its measured planning time to the
             seconds that it counts as.
