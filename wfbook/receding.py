@@ -46,7 +46,7 @@ Clock = str | Callable[[int, float], float]
 _FIRST = 8
 """How much more may be spent on the first window, which has all the time it takes."""
 
-_WAITING = 3
+_WAITING = 6
 """How much more on another one that begins at rest: there is no gait to go on with, and the robot waits."""
 
 _AHEAD = 0.003
@@ -80,7 +80,7 @@ def run(
         commit: number of slots of a window that are executed before the next one takes over.
         gap: at which the search of a window ends.
         budget: of relaxations and exact programs for a window; the first has eight times as much, another
-            one that begins at rest three times.
+            one that begins at rest six times.
         clock: "budget", "wall", or a function from a window's number and its measured planning time to the
             seconds that it counts as.
         goal: where to go, ``(x, y)``, from the time; asked whenever a window is planned. Default: the
