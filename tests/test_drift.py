@@ -71,7 +71,7 @@ def test_a_push_along_the_way_is_survived_and_foreseen(coast, push):
             real.append((robot.com, robot.com_velocity, robot.centres))
 
     start = slot * 0.3 - 0.15
-    result = run(coast, push=(np.array([push, 0.0, 0.0]), start, 0.2), continuation=watch)
+    result = run(coast, hold=0.3, push=(np.array([push, 0.0, 0.0]), start, 0.2), continuation=watch)
     assert result.metrics["upright"]
     away = result.com[-1, 0] - interpolate(coast, 1e3)[0][0]
     assert away * push > 0 and abs(away) > 2 * SLACK

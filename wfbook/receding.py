@@ -43,9 +43,11 @@ if TYPE_CHECKING:
 
 Clock = str | Callable[[int, float], float]
 
-_FIRST = 4
-"""How much more may be spent on a window that begins at rest: there is no gait to go on with, and the robot
-can wait."""
+_FIRST = 8
+"""How much more may be spent on the first window, which has all the time it takes."""
+
+_WAITING = 6
+"""How much more on another one that begins at rest: there is no gait to go on with, and the robot waits."""
 
 _AHEAD = 0.003
 """How long before its first lift-off a plan is taken over: more than a tick, less than two."""
@@ -77,8 +79,8 @@ def run(
         window: number of slots that are planned at once.
         commit: number of slots of a window that are executed before the next one takes over.
         gap: at which the search of a window ends.
-        budget: of relaxations and exact programs for a window; one that begins at rest has four times as
-            much.
+        budget: of relaxations and exact programs for a window; the first has eight times as much, another
+            one that begins at rest six times.
         clock: "budget", "wall", or a function from a window's number and its measured planning time to the
             seconds that it counts as.
         goal: where to go, ``(x, y)``, from the time; asked whenever a window is planned. Default: the
@@ -260,7 +262,7 @@ class _Loop:
         knot = slot * self.problem.knots_per_slot
         question.correction = float(np.linalg.norm((state.position - plan.x[knot])[:2]))
         known = hints(self._gait, slot - self._began, question.problem.slots)
-        budget = self.budget * (_FIRST if slot == plan.slots else 1)
+        budget = self.budget * (_WAITING if slot == plan.slots else 1)
         self.planner.ask(question.problem, known, self.gap, budget)
         self._question = question
 
