@@ -34,9 +34,9 @@ class Gains:
 
     com_kp: np.ndarray = field(default_factory=lambda: np.array([200.0, 200.0, 400.0]))
     com_kd: np.ndarray = field(default_factory=lambda: np.array([28.0, 28.0, 40.0]))
-    attitude_kp: np.ndarray = field(default_factory=lambda: np.array([900.0, 900.0, 400.0]))
-    attitude_kd: np.ndarray = field(default_factory=lambda: np.array([60.0, 60.0, 40.0]))
-    attitude_ki: np.ndarray = field(default_factory=lambda: np.array([8000.0, 8000.0, 0.0]))
+    attitude_kp: np.ndarray = field(default_factory=lambda: np.array([640.0, 640.0, 400.0]))
+    attitude_kd: np.ndarray = field(default_factory=lambda: np.array([50.0, 50.0, 40.0]))
+    attitude_ki: np.ndarray = field(default_factory=lambda: np.array([6000.0, 6000.0, 0.0]))
     most_integral: float = 20.0
     integral_fade: float = 0.3
     wheel_kp: float = 150.0
@@ -44,7 +44,7 @@ class Gains:
     swing_kp: float = 400.0
     swing_kd: float = 40.0
     com_weight: float = 1000.0
-    attitude_weight: float = 5.0
+    attitude_weight: float = 3.0
     wheel_weight: float = 30.0
     swing_weight: float = 10.0
     contact_damping: float = 40.0
