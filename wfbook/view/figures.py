@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from wfbook.simulate import Run
 
 _BAR_HEIGHT = 0.72
+_LABELS = 20  # on the time axis of a gait, at most; more would overlap
 _COMPONENTS = ("x", "y", "z")
 _AXES = ("roll", "pitch", "yaw")
 
@@ -50,7 +51,8 @@ def gait(plan: "Plan", title: str | None = None) -> Picture:
     edges = plan.t[0] + plan.slot_duration * np.arange(plan.slots + 1)
     draw_gait(axes, edges, plan_modes(plan.S, plan.end_effector))
     axes.set_xlim(edges[0], edges[-1])
-    axes.set_xticks(edges)
+    axes.set_xticks(edges, minor=True)
+    axes.set_xticks(edges[:: -(-plan.slots // _LABELS)])
     axes.xaxis.set_major_formatter("{x:.1f}")
     axes.set_xlabel("time (s)")
     axes.set_ylabel("leg")
