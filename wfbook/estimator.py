@@ -40,6 +40,7 @@ from wfbook.leg_odometry import (
     expected_ends,
     propagate,
 )
+from wfbook.reference import TICK
 from wfbook.sensors import Reading, SensorNoise, Sensors
 
 if TYPE_CHECKING:
@@ -101,7 +102,7 @@ class Estimator:
         wheel_model: str = "encoder",
         noise: SensorNoise | None = None,
         tuning: Tuning | None = None,
-        dt: float = 0.002,
+        dt: float = TICK,
     ) -> None:
         if wheel_model not in WHEEL_MODELS:
             raise ValueError(f"wheel_model: {wheel_model!r} is none of {', '.join(WHEEL_MODELS)}")

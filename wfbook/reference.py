@@ -8,6 +8,9 @@ import numpy as np
 if TYPE_CHECKING:
     from wfbook.terrain import Terrain
 
+TICK = 0.002
+"""Time from one tick of controller, sensors and estimator to the next, in seconds."""
+
 
 @dataclass(frozen=True)
 class Gains:

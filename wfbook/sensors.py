@@ -17,6 +17,7 @@ import pinocchio as pin
 
 from wfbook.go1 import IMU_POSITION
 from wfbook.go1_dynamics import GRAVITY, MOTORS, WHEELS, cross
+from wfbook.reference import TICK
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ class Sensors:
             is what the world's x axis means.
     """
 
-    def __init__(self, seed: int = 0, noise: SensorNoise | None = None, dt: float = 0.002) -> None:
+    def __init__(self, seed: int = 0, noise: SensorNoise | None = None, dt: float = TICK) -> None:
         self.noise = noise = SensorNoise() if noise is None else noise
         self.dt = dt
         self._random = random = np.random.default_rng([seed, 44])

@@ -16,7 +16,7 @@ from wfbook.estimator import TOUCH, Estimator
 from wfbook.go1 import RADII, Go1
 from wfbook.go1_dynamics import MOTORS, WHEELS, Go1Dynamics, roll_pitch_yaw
 from wfbook.modes import END_EFFECTORS, LEGS
-from wfbook.reference import Gains, Ground, Reference
+from wfbook.reference import TICK, Gains, Ground, Reference
 from wfbook.runs import Run, metrics_of
 from wfbook.sensors import SensorNoise, Sensors
 from wfbook.tracking import Tracker
@@ -35,7 +35,6 @@ differs from the present one; None to go on as before."""
 SETTLE = 0.5
 """Time in which the robot comes to rest in the plan's first posture."""
 
-_CONTROL_STEPS = 2
 _FALLEN_TILT = np.cos(np.radians(60.0))
 
 
@@ -115,6 +114,7 @@ class _Execution:
         self.controller = WholeBodyController(self.dynamics, gains)
         self.tracker = Tracker(plan, delay)
         self.step_time = float(self.robot.model.opt.timestep)
+        self.steps_a_tick = round(TICK / self.step_time)
         kinds = np.array([END_EFFECTORS.index(name) for name in plan.meta["start_end_effectors"]])
         qpos = self.dynamics.posture(plan.x[0], self.tracker.lean.at(-SETTLE)[0], self.tracker.start_ends())
         qpos[1 + MOTORS] += 0.002 * np.random.default_rng(seed).standard_normal(12)
@@ -154,7 +154,7 @@ class _Execution:
         while step < (steps := self._steps(hold)):
             step += 1
             t = step * self.step_time - SETTLE
-            if step % _CONTROL_STEPS == 0:
+            if step % self.steps_a_tick == 0:
                 command = self._tick(t)
                 if continuation is not None:
                     began += self._go_on(t, continuation)
@@ -162,7 +162,7 @@ class _Execution:
                     waiting.extend([command] * round(self.delay / self.step_time))
             waiting.append(command)
             torque = waiting.popleft()
-            if step % _CONTROL_STEPS == 0:
+            if step % self.steps_a_tick == 0:
                 self.log["tau"].append(torque)
             self._push(t)
             self._physics(torque, t)
@@ -284,9 +284,7 @@ class _Execution:
         self.standing = np.where(standing, self.standing + 1, 0)
         contact = contacts(self.truth, ground, ref.wheels)
         velocity = contact.velocity * np.where(ref.wheels[:, None], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0])
-        self.slip = np.where(
-            self.standing[:, None] > 10, self.slip + _CONTROL_STEPS * self.step_time * velocity, 0.0
-        )
+        self.slip = np.where(self.standing[:, None] > 10, self.slip + TICK * velocity, 0.0)
         self.slip_max = max(self.slip_max, float(np.linalg.norm(self.slip, axis=1).max()))
         for leg in np.flatnonzero(standing):
             radius, rolls = RADII[int(ref.wheels[leg])], bool(ref.wheels[leg])

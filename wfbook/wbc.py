@@ -21,10 +21,7 @@ import numpy as np
 
 from wfbook.go1_dynamics import GRAVITY, Go1Dynamics, cross
 from wfbook.qp import QuadraticProgram, Solver
-from wfbook.reference import Gains, Ground, Reference
-
-TICK = 0.002
-"""Time from tick to tick, in seconds."""
+from wfbook.reference import TICK, Gains, Ground, Reference
 
 LEG_COLUMNS = 6 + np.arange(12).reshape(4, 3)
 """Where the joints of each leg stand in the 18 accelerations."""
@@ -333,7 +330,7 @@ class WholeBodyController:
         return self._last
 
     def _integrate(self, ref: Reference) -> None:
-        """Add a tilt up that stays: against eq. 34 alone, dry friction in the joints holds two degrees.
+        """Add up a tilt that stays: with dry friction in the joints, eq. 34 alone leaves two degrees of it.
 
         On two legs a tilt is no sign of friction, and there is nothing to correct it with: there it fades.
         """
