@@ -14,11 +14,11 @@ ORDER = (
     "archive", "polygon", "terrain", "centroidal", "swing", "modes", "friction", "planner", "go1",
     "go1_dynamics", "reference", "qp", "wbc", "sensors", "leg_odometry", "estimator", "footing", "lean",
     "drift", "tracking", "runs", "simulate", "forecast", "receding", "view", "report", "results", "arguments",
-    "quoted", "table2", "study", "paper", "__main__",
+    "quoted", "table2", "study", "paper", "exercises", "__main__",
 )  # fmt: skip
 """The modules and packages, helpers before the chapter that they serve."""
 
-DRAWING = {"matplotlib", "meshcat", "ipywidgets"}
+DRAWING = {"anywidget", "matplotlib", "meshcat", "ipywidgets"}
 
 
 def files_of(name: str) -> list[Path]:

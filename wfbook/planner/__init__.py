@@ -7,7 +7,8 @@ the fast one. :mod:`.conic` compiles them for Clarabel, :mod:`.presolve` removes
 :mod:`.gait`, :mod:`.boxes` and :mod:`.symmetry` are the logic of gaits. :mod:`.kernel` bounds and prices, on
 two cores with :mod:`.worker`; :mod:`.gaits` guesses, :mod:`.branching` splits, :mod:`.tree` lets SCIP search
 by its :mod:`.plugins`. :mod:`.extract` reads the solution, :mod:`.polish` makes it true, :mod:`.plan` keeps
-it, :mod:`.windows` plans far, :mod:`.ahead` in another process, and :mod:`.stitch` joins the plans.
+it, :mod:`.windows` plans far, :mod:`.ahead` in another process, and :mod:`.stitch` joins the plans;
+:mod:`.stored` reads those that come with the book.
 
 :mod:`.explain` says why there is nothing to find: :mod:`.elastic` answers, on a :mod:`.wide` problem and with
 :mod:`.feasibility`, what would be possible without some limits; :mod:`.reasons` and :mod:`.neighbours` name
@@ -20,6 +21,7 @@ from wfbook.planner.polish import polish, repaired, torque_mismatch
 from wfbook.planner.problem import InitialState, Limits, Problem, Weights
 from wfbook.planner.reasons import Reason
 from wfbook.planner.solve import solve, solve_executable
+from wfbook.planner.stored import stored
 from wfbook.planner.tree import Progress
 from wfbook.planner.windows import solve_windows
 
@@ -38,5 +40,6 @@ __all__ = [
     "solve",
     "solve_executable",
     "solve_windows",
+    "stored",
     "torque_mismatch",
 ]

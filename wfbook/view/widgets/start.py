@@ -1,9 +1,5 @@
-"""Widgets that change a problem and plan again.
+"""Chapter 0's widget: the same problem with and without wheels."""
 
-Each is a class with ``observe`` methods: a test sets a trait and looks at the result, without a browser.
-"""
-
-import base64
 import html
 import math
 from collections.abc import Callable
@@ -13,7 +9,7 @@ from typing import TYPE_CHECKING
 import ipywidgets
 
 from wfbook.view import figures
-from wfbook.view.style import Picture
+from wfbook.view.widgets.panel import image, table
 
 if TYPE_CHECKING:
     from wfbook.planner import Plan, Problem, Progress
@@ -105,14 +101,14 @@ class WheelsToggle(ipywidgets.VBox):
         """Write one line for every plan that is known."""
         names = ("feet only", "feet and wheels")
         rows = [_row(names[wheels], plan) for wheels, plan in sorted(self._plans.items())]
-        self.comparison.value = _table(rows)
+        self.comparison.value = table(_COLUMNS, rows)
 
     def _show(self, plan: "Plan") -> None:
         """Draw a plan."""
         self.plan = plan
         self.status.value = ""
-        self.gait.value = _image(figures.gait(plan), "gait diagram: what each leg stands on over time")
-        self.path.value = _image(figures.com_path(plan), "path of the centre of mass and contacts from above")
+        self.gait.value = image(figures.gait(plan), "gait diagram: what each leg stands on over time")
+        self.path.value = image(figures.com_path(plan), "path of the centre of mass and contacts from above")
 
     def _refuse(self, message: str) -> None:
         """Show why there is no plan, in the place of what would belong to another one."""
@@ -132,20 +128,4 @@ def _row(name: str, plan: "Plan") -> tuple[str, ...]:
         str(int(plan.S.sum())),
         f"{plan.distance:.2f} m",
         f"{meta['solve_time']:.1f} s",
-    )
-
-
-def _table(rows: list[tuple[str, ...]]) -> str:
-    cell = '<td style="padding:2px 12px 2px 0;text-align:left">'
-    lines = [
-        f"<tr>{''.join(cell + html.escape(text) + '</td>' for text in row)}</tr>" for row in (_COLUMNS, *rows)
-    ]
-    return f"<table>{''.join(lines)}</table>"
-
-
-def _image(picture: Picture, description: str) -> str:
-    data = base64.b64encode(picture.png()).decode("ascii")
-    width = round(96 * picture.get_size_inches()[0])
-    return (
-        f'<img src="data:image/png;base64,{data}" alt="{description}" style="width:{width}px;max-width:100%">'
     )
