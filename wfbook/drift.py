@@ -55,12 +55,12 @@ class Drift:
         if t >= self._until:
             self.offset, self.pace, self._until = np.zeros(3), 1.0, np.inf
         com, velocity, acceleration = planned
-        along = self.offset[0]
+        along = float(self.offset[0])
         if not rolling:
-            along += (self.pace - 1.0) * (com[0] - self._before)
-        elif beyond := excess(robot.com[0] - com[0] - along):
+            along += (self.pace - 1.0) * float(com[0] - self._before)
+        elif beyond := excess(float(robot.com[0] - com[0]) - along):
             along += beyond
-            self.pace = pace_of(robot.com_velocity[0], velocity[0])
+            self.pace = pace_of(float(robot.com_velocity[0]), float(velocity[0]))
         self._before = com[0]
         if along:
             self.offset = np.array([along, 0.0, -along * normal[0] / normal[2]])
@@ -74,9 +74,9 @@ class Drift:
 
 def pace_of(speed: float, planned: float) -> float:
     """Return how many times faster than planned a robot rolls; never backwards."""
-    return float(np.clip(speed / planned, 0.0, _FASTEST)) if abs(planned) > _SLOW else 1.0
+    return min(max(speed / planned, 0.0), _FASTEST) if abs(planned) > _SLOW else 1.0
 
 
 def excess(error: float) -> float:
     """Return by how much an error is more than what a plan can be off a rolling robot."""
-    return float(error - np.clip(error, -SLACK, SLACK))
+    return error - min(max(error, -SLACK), SLACK)

@@ -96,18 +96,19 @@ def leg_kinematics(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarr
         ``(4, 3)`` ends (centres of foot and wheel), ``(4, 3, 3)`` their Jacobians, and ``(4, 3, 3)`` the
         Jacobians of the calves' angular velocities, whose last columns are the wheels' axles.
     """
-    cos, sin = np.cos(angles[:, 0]), np.sin(angles[:, 0])
-    slopes = np.stack([angles[:, 1], angles[:, 1] + angles[:, 2]])
+    hip, thigh, calf = angles.T
+    cos, sin = np.cos(hip), np.sin(hip)
+    slopes = np.array([thigh, thigh + calf])
     x, depth = -_LINK * np.sin(slopes), -_LINK * np.cos(slopes)  # of thigh and calf, before the hip turns
-    links = np.stack([x, -sin * depth, cos * depth], axis=2)
-    axles = np.stack([0.0 * cos, cos, sin], axis=1)
+    links = np.array([x, -sin * depth, cos * depth]).transpose(1, 2, 0)
+    axles = np.array([0.0 * cos, cos, sin]).T
     from_knee, from_thigh = links[1], links[0] + links[1]
     from_hip = from_thigh + _ABDUCTION * _SIDES[:, 1:2] * axles
     turning, levers = np.zeros((4, 3, 3)), np.empty((4, 3, 3))
     turning[:, 0, 0] = 1.0
     turning[:, :, 1] = turning[:, :, 2] = axles
     levers[:, :, 0], levers[:, :, 1], levers[:, :, 2] = from_hip, from_thigh, from_knee
-    jacobian = turning[:, _YZX] * levers[:, _ZXY] - turning[:, _ZXY] * levers[:, _YZX]
+    jacobian = turning.take(_YZX, 1) * levers.take(_ZXY, 1) - turning.take(_ZXY, 1) * levers.take(_YZX, 1)
     return _HIP * _SIDES + from_hip, jacobian, turning
 
 
@@ -149,10 +150,12 @@ class Go1:
         mujoco.mj_setConst(model, self.data)
         names = [[f"{leg}_{kind}" for kind in END_EFFECTORS] for leg in LEGS]
         self._geoms = np.array([[model.geom(name).id for name in pair] for pair in names])
-        self._leg_of_geom = np.full(model.ngeom, -1)
-        self._leg_of_geom[self._geoms] = np.arange(4)[:, None]
+        self._leg_of_geom = [-1] * model.ngeom
+        for leg, pair in enumerate(self._geoms):
+            for geom in pair:
+                self._leg_of_geom[geom] = leg
         self._bits = model.geom_contype[self._geoms].copy()
-        self._robot_geom = model.geom_bodyid != 0
+        self._robot_geom = (model.geom_bodyid != 0).tolist()
         self._trunk = trunk
         self._sites = np.array([model.site(f"{leg}_end").id for leg in LEGS])
 
@@ -186,7 +189,7 @@ class Go1:
     @property
     def end_effectors(self) -> np.ndarray:
         """``(4,)`` int8: 0 foot, 1 wheel."""
-        return (self.model.geom_contype[self._geoms[:, 1]] != 0).astype(np.int8)
+        return (self.model.geom_contype.take(self._geoms[:, 1]) != 0).astype(np.int8)
 
     def set_end_effector(self, leg: str, kind: str) -> None:
         """Make a leg stand on its foot or on its wheel from now on.
@@ -223,24 +226,20 @@ class Go1:
         """Return the force of the ground on each leg's end effector, world frame, ``(4, 3)``."""
         data, forces = self.data, np.zeros((4, 3))
         contact = data.contact
-        for i in range(data.ncon):
-            first, second = contact.geom[i]
-            leg = self._leg_of_geom[second] if self._robot_geom[second] else self._leg_of_geom[first]
-            start = contact.efc_address[i]
+        frames, acting = contact.frame.reshape(-1, 3, 3), data.efc_force
+        pairs = zip(contact.geom.tolist(), contact.efc_address.tolist(), frames, strict=True)
+        for (first, second), start, frame in pairs:
+            on_second = self._robot_geom[second]
+            leg = self._leg_of_geom[second if on_second else first]
             if leg >= 0 and start >= 0:
-                force = contact.frame[i].reshape(3, 3).T @ data.efc_force[start : start + 3]
-                forces[leg] += (
-                    force if self._robot_geom[second] else -force
-                )  # the frame points to the second geom
+                force = acting[start : start + 3] @ frame
+                forces[leg] += force if on_second else -force  # the frame points to the second geom
         return forces
 
     def touches_with_hull(self) -> bool:
         """Whether anything but feet and wheels touches the ground."""
-        return (
-            bool(np.any(self._leg_of_geom[self.data.contact.geom].max(axis=1) < 0))
-            if self.data.ncon
-            else False
-        )
+        leg_of = self._leg_of_geom
+        return any(max(leg_of[a], leg_of[b]) < 0 for a, b in self.data.contact.geom.tolist())
 
 
 def convex_bodies(terrain: "Terrain") -> list[list[int]]:

@@ -36,17 +36,27 @@ WHEEL_FLATNESS = WHEEL_RADIUS**2 - WHEEL_HALF_WIDTH**2
 """Difference of the squared semi-axes of the wheel's ellipsoid: how much its camber matters."""
 
 _SKEW = np.array([[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0.0]])
+_CYCLIC, _REVERSED = np.array([1, 2, 0, 2, 0, 1]), np.array([2, 0, 1, 1, 2, 0])
+_ONES = np.ones(3)
+_MINUS = np.vstack([np.eye(3), -np.eye(3)])
 _KEPT = np.concatenate([np.arange(6), MOTORS])
+_KEPT_KEPT, _KEPT_WHEELS = 22 * _KEPT[:, None] + _KEPT, 22 * _KEPT[:, None] + WHEELS
+"""Where parts of a (22, 22) matrix stand when its rows stand one after the other; `take` is quick."""
 
 
 def skew(vectors: np.ndarray) -> np.ndarray:
     """Return the matrices ``[v]×`` with ``[v]× u = v × u``, shape ``(..., 3, 3)`` of ``(..., 3)``."""
-    return (vectors @ _SKEW).reshape(*np.shape(vectors), 3)
+    return (vectors @ _SKEW).reshape(vectors.shape + (3,))
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return ``a × b`` of ``(..., 3)`` arrays; for a handful of vectors three times quicker than NumPy's."""
-    return (skew(a) @ b[..., None])[..., 0]
+    """Return ``a × b`` of ``(..., 3)`` arrays; for a handful of vectors six times quicker than NumPy's."""
+    return (a.take(_CYCLIC, -1) * b.take(_REVERSED, -1)) @ _MINUS
+
+
+def dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the inner products ``(n,)`` of the rows of ``(n, 3)`` arrays."""
+    return (a * b) @ _ONES
 
 
 def rotation(rpy: np.ndarray) -> np.ndarray:
@@ -75,11 +85,14 @@ def contact_offsets(axles: np.ndarray, normals: np.ndarray, wheels: np.ndarray) 
     Returns:
         ``(4, 3)``, in that frame.
     """
-    camber = (normals * axles).sum(axis=1, keepdims=True)
+    foot = -FOOT_RADIUS * normals
+    if not wheels.any():
+        return foot
+    camber = dot(normals, axles)[:, None]
     wheel = -(WHEEL_RADIUS**2 * normals - WHEEL_FLATNESS * camber * axles) / np.sqrt(
         WHEEL_RADIUS**2 - WHEEL_FLATNESS * camber**2
     )
-    return np.where(np.asarray(wheels)[:, None], wheel, -FOOT_RADIUS * normals)
+    return np.where(wheels[:, None], wheel, foot)
 
 
 class Go1Dynamics:
@@ -116,10 +129,14 @@ class Go1Dynamics:
         self._v_index = np.array([*range(6), *(self.model.idx_vs[j] for j in joints)])
         self._q_index = np.array([*range(7), *(self.model.idx_qs[j] for j in joints)])
         self._calves, self._wheels = joints[2::4], joints[3::4]
-        self._mask = np.zeros((4, 1, 22))
+        self._columns = self._v_index[_KEPT]
+        # CRBA fills in the upper triangle alone; stored by columns, it is the lower one of the transpose.
+        self._upper = 22 * np.maximum.outer(self._v_index, self._v_index)
+        self._upper += np.minimum.outer(self._v_index, self._v_index)
+        self._mask = np.zeros((4, 1, 18))
         self._mask[:, :, :6] = 1.0
         for leg in range(4):
-            self._mask[leg, :, 6 + 4 * leg : 9 + 4 * leg] = 1.0
+            self._mask[leg, :, 6 + 3 * leg : 9 + 3 * leg] = 1.0
         self.mass = pin.computeTotalMass(self.model)
         self.effort = np.array([self.model.effortLimit[i] for i in self._v_index[MOTORS]])
         self.lower = self.model.lowerPositionLimit[self._q_index[MOTORS + 1]]
@@ -154,49 +171,46 @@ class Go1Dynamics:
         pin.crba(model, data, q, pin.Convention.WORLD)
         pin.nonLinearEffects(model, data, q, v)
         pin.computeJointJacobiansTimeVariation(model, data, q, v)
-        order = self._v_index
-        v = v[order]
-        upper = data.M[np.ix_(order, order)]
-        self.M_full = np.triu(upper) + np.triu(upper, 1).T
-        self.h_full = data.nle[order]
-        self.velocity = v[_KEPT]
-        self.joint_angles = np.asarray(qpos)[7 + (MOTORS - 6)]
+        self.M_full = data.M.T.take(self._upper)
+        self.h_full = data.nle.take(self._v_index)
+        self.velocity = v.take(self._columns)
+        self.joint_angles = qpos.take(MOTORS + 1)
         self.trunk_position = np.array(qpos[:3], dtype=float)
         self.R_wb = np.array(data.oMi[1].rotation)
         self._eliminate_wheels()
         self._centre_of_mass()
-        self._legs(np.array(data.J)[:, order], np.array(data.dJ)[:, order], v)
+        self._legs(data.J.take(self._columns, 1), data.dJ.take(self._columns, 1))
 
     def _eliminate_wheels(self) -> None:
         """Solve the wheels' own rows, in which no torque acts, for their spin and insert it in the others."""
-        coupling = self.M_full[np.ix_(_KEPT, WHEELS)] / self.M_full[WHEELS, WHEELS]
-        self.M = self.M_full[np.ix_(_KEPT, _KEPT)] - coupling @ self.M_full[np.ix_(WHEELS, _KEPT)]
-        self.h = self.h_full[_KEPT] - coupling @ self.h_full[WHEELS]
+        shared = self.M_full.take(_KEPT_WHEELS)
+        coupling = shared / self.M_full.diagonal()[WHEELS]
+        self.M = self.M_full.take(_KEPT_KEPT) - coupling @ shared.T
+        self.h = self.h_full.take(_KEPT) - coupling @ self.h_full.take(WHEELS)
 
     def _centre_of_mass(self) -> None:
         """Read the centre of mass off the trunk's rows: they are Newton's law of the whole robot."""
         M, m = self.M_full, self.mass
         c_b = np.array([M[1, 5], M[2, 3], M[0, 4]]) / m  # M[:3, 3:6] = -m [c]×
+        R = self.R_wb / m
         self.com = self.trunk_position + self.R_wb @ c_b
-        self.com_jacobian = self.R_wb @ M[:3][:, _KEPT] / m
+        self.com_jacobian = R @ M[:3].take(_KEPT, 1)
         self.com_velocity = self.com_jacobian @ self.velocity
-        self.com_drift = self.R_wb @ self.h_full[:3] / m + GRAVITY
+        self.com_drift = R @ self.h_full[:3] + GRAVITY
         self._c_b = c_b
 
-    def _legs(self, J: np.ndarray, dJ: np.ndarray, v: np.ndarray) -> None:
-        """Fill in the kinematics of the legs' ends from the Jacobians at the world's origin."""
+    def _legs(self, J: np.ndarray, dJ: np.ndarray) -> None:
+        """Fill in the kinematics of the legs' ends from Jacobians at the world's origin, ``(6, 18)``."""
         self.centres = np.array([self.data.oMi[j].translation for j in self._wheels])
         self.axles = np.array([self.data.oMi[j].rotation[:, 1] for j in self._calves])
-        lever = skew(self.centres)
-        angular = J[3:] * self._mask
-        linear = J[:3] * self._mask - lever @ angular
-        moving = self._mask[:, 0] * v
-        a_origin, alpha = moving @ dJ[:3].T, moving @ dJ[3:].T
-        omega = moving @ J[3:].T
-        velocity = np.einsum("lij,j->li", linear, v)
-        self.centre_jacobian, self.calf_jacobian = linear[:, :, _KEPT], angular[:, :, _KEPT]
-        self.centre_velocity, self.calf_omega, self.calf_alpha_drift = velocity, omega, alpha
-        self.centre_drift = a_origin + cross(alpha, self.centres) + cross(omega, velocity)
+        self.calf_jacobian = angular = J[3:] * self._mask
+        self.centre_jacobian = J[:3] * self._mask - skew(self.centres) @ angular
+        moving = self._mask[:, 0] * self.velocity
+        twist, drift = moving @ J.T, moving @ dJ.T  # linear and angular, of the calf's matter at the origin
+        self.calf_omega, self.calf_alpha_drift = twist[:, 3:], drift[:, 3:]
+        self.centre_velocity = twist[:, :3] + cross(self.calf_omega, self.centres)
+        self.centre_drift = drift[:, :3] + cross(self.calf_alpha_drift, self.centres)
+        self.centre_drift += cross(self.calf_omega, self.centre_velocity)
 
     def contact_offsets(self, normals: np.ndarray, wheels: np.ndarray) -> np.ndarray:
         """Return :func:`contact_offsets` in the world, with the axles at this state, ``(4, 3)``."""
@@ -218,7 +232,11 @@ class Go1Dynamics:
         """
         jacobian = self.centre_jacobian - skew(offsets) @ self.calf_jacobian
         drift = self.centre_drift + cross(self.calf_alpha_drift, offsets)
-        return jacobian, drift, self.centre_velocity + cross(self.calf_omega, offsets)
+        return jacobian, drift, self.contact_velocity(offsets)
+
+    def contact_velocity(self, offsets: np.ndarray) -> np.ndarray:
+        """Return the velocities ``(4, 3)`` of the points at ``offsets`` ``(4, 3)`` from the legs' ends."""
+        return self.centre_velocity + cross(self.calf_omega, offsets)
 
     def composite_inertia(self) -> np.ndarray:
         """Return the whole robot's inertia about its centre of mass, ``(3, 3)``, in the trunk's frame."""

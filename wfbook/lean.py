@@ -6,6 +6,7 @@ controller therefore turns the trunk with the plane of the planned footholds. Th
 contacts stay where the plan has them.
 """
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -52,12 +53,13 @@ class Lean:
         Returns:
             Roll, pitch and yaw, ``(3,)``; angular velocity ``(3,)`` in the world.
         """
-        j = int(np.floor(t / self._slot))
+        j, last = math.floor(t / self._slot), len(self._angles) - 1
         s = t / self._slot - j
-        control = self._angles[np.clip(j + np.arange(-1, 3), 0, len(self._angles) - 1)]
-        roll, pitch = np.array([1.0, s, s * s, s**3]) @ _SPLINE @ control
-        roll_rate, pitch_rate = np.array([0.0, 1.0, 2 * s, 3 * s * s]) @ _SPLINE @ control / self._slot
-        omega = np.array([roll_rate * np.cos(pitch), pitch_rate, -roll_rate * np.sin(pitch)])
+        control = self._angles[[min(max(i, 0), last) for i in range(j - 1, j + 3)]]
+        powers = np.array([(1.0, s, s * s, s**3), (0.0, 1.0, 2 * s, 3 * s * s)])
+        (roll, pitch), rates = (powers @ (_SPLINE @ control)).tolist()
+        roll_rate, pitch_rate = (rate / self._slot for rate in rates)
+        omega = np.array([roll_rate * math.cos(pitch), pitch_rate, -roll_rate * math.sin(pitch)])
         return np.array([roll, pitch, 0.0]), omega
 
 

@@ -8,6 +8,8 @@ import numpy as np
 if TYPE_CHECKING:
     from wfbook.terrain import Terrain
 
+_AHEAD = np.array([1.0, 0.0, 0.0])
+
 TICK = 0.002
 """Time from one tick of controller, sensors and estimator to the next, in seconds."""
 
@@ -86,14 +88,10 @@ class Ground:
         chosen = [terrain.regions[i] for i in regions]
         if normals is None:
             normals = np.array([r.normal for r in chosen])
-        tangents = np.array([1.0, 0.0, 0.0]) - normals[:, :1] * normals
-        return cls(
-            normals,
-            tangents / np.linalg.norm(tangents, axis=1, keepdims=True),
-            np.array([r.mu_foot for r in chosen]),
-            np.array([r.mu_wheel_lateral for r in chosen]),
-            np.array([r.rolling_resistance for r in chosen]),
-        )
+        tangents = _AHEAD - normals[:, :1] * normals
+        friction = np.array([(r.mu_foot, r.mu_wheel_lateral, r.rolling_resistance) for r in chosen])
+        # Of a projection, the squared length is its component along what is projected.
+        return cls(normals, tangents / np.sqrt(tangents[:, :1]), *friction.T)
 
 
 @dataclass(frozen=True)

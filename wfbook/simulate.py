@@ -14,13 +14,13 @@ import numpy as np
 
 from wfbook.estimator import TOUCH, Estimator
 from wfbook.go1 import RADII, Go1
-from wfbook.go1_dynamics import MOTORS, WHEELS, Go1Dynamics, roll_pitch_yaw
+from wfbook.go1_dynamics import MOTORS, WHEELS, Go1Dynamics, dot, roll_pitch_yaw
 from wfbook.modes import END_EFFECTORS, LEGS
 from wfbook.reference import TICK, Gains, Ground, Reference
 from wfbook.runs import Run, metrics_of
 from wfbook.sensors import SensorNoise, Sensors
 from wfbook.tracking import Tracker
-from wfbook.wbc import WholeBodyController, contacts, weight_share
+from wfbook.wbc import WholeBodyController, contact_basis, weight_share
 
 if TYPE_CHECKING:
     from wfbook.planner.plan import Plan
@@ -128,7 +128,7 @@ class _Execution:
         self.times: dict[str, list] = {"tick": [], "estimator": []}
         self.work = np.zeros(2)
         self.asked = np.zeros((4, 3))
-        self.slip, self.slip_max, self.standing = np.zeros((4, 3)), 0.0, np.zeros(4, int)
+        self.slip, self.slip_max, self.standing = np.zeros((4, 2)), 0.0, np.zeros(4, int)
         self.astray = 0.0
         self.meta = {
             "delay": delay,
@@ -213,7 +213,7 @@ class _Execution:
         """Run the controller once, log, and return the torques it commands."""
         robot, dynamics, tracker, truth = self.robot, self.dynamics, self.tracker, self.truth
         forces = robot.contact_forces()
-        loads = np.linalg.norm(forces, axis=1)
+        loads = np.sqrt(dot(forces, forces))
         touching = loads > TOUCH
         qpos, qvel, estimator_time = self._known(touching)
         if truth is not dynamics:
@@ -230,7 +230,8 @@ class _Execution:
         command = self.controller.tick(ref, ground)
         self.asked, self.normals = command.forces, ground.normals
         elapsed = time.perf_counter() - began
-        self._slip(ground, ref, forces)
+        offsets = truth.contact_offsets(ground.normals, present)
+        self._slip(ground, ref, offsets, forces)
         sample = {
             "t": t,
             "qpos": robot.data.qpos.copy(),
@@ -240,7 +241,7 @@ class _Execution:
             "com_velocity": truth.com_velocity,
             "rpy": roll_pitch_yaw(truth.R_wb),
             "rpy_ref": roll_pitch_yaw(ref.R_wb),
-            "p": truth.centres + truth.contact_offsets(ground.normals, present),
+            "p": truth.centres + offsets,
             "contact_force": forces,
             "in_contact": loads > 1.0,
             "end_effector": robot.end_effectors,
@@ -275,17 +276,19 @@ class _Execution:
         known_velocity[WHEELS] = reading.wheel_rates
         return known, known_velocity, elapsed
 
-    def _slip(self, ground: Ground, ref: Reference, forces: np.ndarray) -> None:
+    def _slip(self, ground: Ground, ref: Reference, offsets: np.ndarray, forces: np.ndarray) -> None:
         """Add up how far standing feet slide, and wheels sideways; a foot's rolling is no slip.
 
-        Also note how far their contacts are beside their regions.
+        Also note how far their contacts are beside their regions. ``offsets`` ``(4, 3)`` are those of the
+        contacts from the legs' ends.
         """
         standing = ref.stance & (forces[:, 2] > TOUCH)
-        self.standing = np.where(standing, self.standing + 1, 0)
-        contact = contacts(self.truth, ground, ref.wheels)
-        velocity = contact.velocity * np.where(ref.wheels[:, None], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0])
-        self.slip = np.where(self.standing[:, None] > 10, self.slip + TICK * velocity, 0.0)
-        self.slip_max = max(self.slip_max, float(np.linalg.norm(self.slip, axis=1).max()))
+        self.standing = standing * (self.standing + 1)
+        basis = contact_basis(self.truth, ground, ref.wheels)
+        velocity = (basis @ self.truth.contact_velocity(offsets)[:, :, None])[:, :2, 0]
+        velocity[:, 0] *= ~ref.wheels
+        self.slip = (self.standing > 10)[:, None] * (self.slip + TICK * velocity)
+        self.slip_max = max(self.slip_max, *np.hypot(*self.slip.T).tolist())
         for leg in np.flatnonzero(standing):
             radius, rolls = RADII[int(ref.wheels[leg])], bool(ref.wheels[leg])
             aside = self.tracker.footing.astray(leg, self.truth.centres[leg], radius, rolls)
@@ -299,11 +302,12 @@ class _Execution:
 
     def _physics(self, torque: np.ndarray, t: float) -> None:
         """Simulate a millisecond and account for the motors' work once the plan has begun."""
-        before = self.robot.data.qvel[MOTORS].copy()
+        before = self.robot.data.qvel.take(MOTORS)
         self.robot.step(torque)
         if t >= 0.0:
-            power = torque * 0.5 * (before + self.robot.data.qvel[MOTORS])
-            self.work += self.step_time * np.array([np.abs(power).sum(), np.maximum(power, 0.0).sum()])
+            power = torque * 0.5 * (before + self.robot.data.qvel.take(MOTORS))
+            positive, total = np.maximum(power, 0.0).sum(), power.sum()
+            self.work += self.step_time * np.array([2.0 * positive - total, positive])
 
     def _fallen(self) -> bool:
         """Whether the trunk is tipped over or anything but the legs' ends lies on the ground."""

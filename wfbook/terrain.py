@@ -100,7 +100,7 @@ class Region:
     def outside(self, x: float, y: float) -> float:
         """How far (x, y) is outside the polygon's farthest edge, seen from above; negative inside."""
         A, b = self.halfspaces
-        return float((A @ (x, y) - b).max())
+        return max((A[:, 0] * x + A[:, 1] * y - b).tolist())
 
     def contains(self, x: float, y: float, tolerance: float = 1e-9) -> bool:
         """Whether (x, y) is inside the polygon or at most ``tolerance`` metres outside an edge."""

@@ -48,6 +48,7 @@ _FARTHEST_ASIDE = 0.06
 _SWITCH_ROOM = 0.004
 _OFF_EDGES = 0.005
 _CATCH_UP = 5.0
+_ONES = np.ones(4)
 
 
 @dataclass(frozen=True)
@@ -176,19 +177,22 @@ class Tracker:
         ahead = interpolate(self.plan, t + self.delay)[2]
         for leg in range(4):
             self._advance(leg, t, bool(touching[leg]), ends[leg], robot.centre_velocity[leg])
-        rolling, normal = bool(self._kinds[self.stance].all()), self.footing.normals.mean(axis=0)
+        rolling, normal = bool((self._kinds | ~self.stance).all()), 0.25 * (_ONES @ self.footing.normals)
         com, velocity, ahead = self.drift.update(t, (com, velocity, ahead), robot, rolling, normal)
         p = np.zeros((4, 3))
         for leg in np.flatnonzero(self.stance):
-            p[leg] = self._standing(leg, t, com)
-            late = p[leg, 0] - ends[leg, 0] + RADII[self._kinds[leg]] * self.footing.normals[leg, 0]
-            self.footing.stand(leg, ends[leg], self._kinds[leg] * (velocity[0] + _CATCH_UP * late))
-            p[leg] += RADII[self._kinds[leg]] * self.footing.normals[leg]
+            place, radius, speed = self._standing(leg, t, com), RADII[self._kinds[leg]], 0.0
+            if self._kinds[leg]:
+                late = place[0] - ends[leg, 0] + radius * self.footing.normals[leg, 0]
+                speed = velocity[0] + _CATCH_UP * late
+            self.footing.stand(leg, ends[leg], speed)
+            p[leg] = place + radius * self.footing.normals[leg]
         ground = self.footing.ground()
-        v, a = np.where(self._kinds[:, None] == 1, velocity, 0.0), np.zeros((4, 3))
-        self._step_aside(t, robot, com, velocity)
-        for leg in np.flatnonzero(~self.stance):
-            p[leg], v[leg], a[leg] = self._in_the_air(leg, t, ground.normals[leg])
+        v, a = self._kinds[:, None] * velocity, np.zeros((4, 3))
+        if not self.stance.all():
+            self._step_aside(t, robot, com, velocity)
+            for leg in np.flatnonzero(~self.stance):
+                p[leg], v[leg], a[leg] = self._in_the_air(leg, t, ground.normals[leg])
         wheels = self._kinds.astype(bool)
         rpy, omega = self.lean.at(t)
         ref = Reference(
@@ -258,10 +262,12 @@ class Tracker:
         t = max(t, flights[count - 1].end) if count else t
         t = min(t, flights[count].start) if count < len(flights) else t
         plan = self.plan
-        place = np.clip(t / plan.dt, 0.0, plan.knots)
+        place = min(max(t / plan.dt, 0.0), float(plan.knots))
         k = min(int(place), plan.knots - 1)
-        p, x = (array[k] + (place - k) * (array[k + 1] - array[k]) for array in (plan.p[:, leg], plan.x))
-        return p + com - x if self._kinds[leg] else p
+        p = plan.p[k, leg] + (place - k) * (plan.p[k + 1, leg] - plan.p[k, leg])
+        if not self._kinds[leg]:
+            return p
+        return p + com - (plan.x[k] + (place - k) * (plan.x[k + 1] - plan.x[k]))
 
     def _may_lift(self, leg: int, t: float) -> bool:
         """Whether a leg due to lift leaves a diagonal pair standing; if not, it waits for late ones a little.

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wfbook.go1_dynamics import GRAVITY, Go1Dynamics, cross
+from wfbook.go1_dynamics import GRAVITY, Go1Dynamics, cross, dot
 from wfbook.qp import QuadraticProgram, Solver
 from wfbook.reference import TICK, Gains, Ground, Reference
 
@@ -28,6 +28,9 @@ LEG_COLUMNS = 6 + np.arange(12).reshape(4, 3)
 
 _DIRECTIONS = np.array([(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)], float)
 _SIDES = len(_DIRECTIONS)
+_INSIDE = np.cos(np.pi / _SIDES)
+"""How much nearer the sides of a pyramid inside the cone are than its corners."""
+
 FRICTION_ROWS = _SIDES + 1
 """Sides of a foot's friction pyramid, and the one that says that it pushes."""
 
@@ -38,7 +41,13 @@ it makes up for: of a sudden change at rest it makes negative damping, and the w
 _FRICTION = 18 + np.arange(4 * FRICTION_ROWS).reshape(4, FRICTION_ROWS)
 _TORQUES = slice(18 + 4 * FRICTION_ROWS, 30 + 4 * FRICTION_ROWS)
 _ROWS = _TORQUES.stop
+_DIAGONAL = 31 * np.arange(30)
+_PYRAMIDS = (30 * _FRICTION[:, :, None] + (18 + np.arange(12)).reshape(4, 1, 3)).ravel()
+"""Where the diagonal of P, and the friction pyramids in A, stand when rows stand one after the other."""
+
 _FREE = np.inf
+_FORCE_UNIT = 10.0
+_EACH = np.ones(4)
 
 
 @dataclass(frozen=True)
@@ -66,13 +75,22 @@ def contacts(robot: Go1Dynamics, ground: Ground, wheels: np.ndarray) -> Contacts
     A foot has the basis of its region. A wheel rolls where it points: t is square to its axle.
     """
     n = ground.normals
-    heading = cross(robot.axles, n)
-    heading /= np.linalg.norm(heading, axis=1, keepdims=True)
-    t = np.where(wheels[:, None], heading, ground.tangents)
-    basis = np.stack([t, cross(n, t), n], axis=1)
+    basis = contact_basis(robot, ground, wheels)
     jacobian, drift, velocity = robot.contacts(robot.contact_offsets(n, wheels))
-    local = np.einsum("lij,klj->kli", basis, np.stack([drift, velocity]))
-    return Contacts(basis, basis @ jacobian, local[0], local[1], np.sum(robot.calf_omega * n, axis=1))
+    drift, velocity = ((basis @ vectors[:, :, None])[:, :, 0] for vectors in (drift, velocity))
+    return Contacts(basis, basis @ jacobian, drift, velocity, dot(robot.calf_omega, n))
+
+
+def contact_basis(robot: Go1Dynamics, ground: Ground, wheels: np.ndarray) -> np.ndarray:
+    """Return the rows t, b, n of each contact in the world, ``(4, 3, 3)`` (Paper A, eq. 26)."""
+    n, t = ground.normals, ground.tangents
+    if wheels.any():
+        heading = cross(robot.axles, n)
+        heading /= np.sqrt(dot(heading, heading))[:, None]
+        t = np.where(wheels[:, None], heading, t)
+    basis = np.empty((4, 3, 3))
+    basis[:, 0], basis[:, 1], basis[:, 2] = t, cross(n, t), n
+    return basis
 
 
 def base_acceleration(robot: Go1Dynamics, ref: Reference, gains: Gains) -> tuple[np.ndarray, np.ndarray]:
@@ -114,10 +132,9 @@ def wheel_acceleration(robot: Go1Dynamics, ref: Reference, along: np.ndarray, ga
     Returns:
         ``(4,)``.
     """
-    w = np.sum(along * (robot.centres - robot.com), axis=1)
-    w_d = np.sum(along * (ref.ends - ref.com), axis=1)
-    w_dot = np.sum(along * (robot.centre_velocity - robot.com_velocity), axis=1)
-    return gains.wheel_kp * (w_d - w) - gains.wheel_kd * w_dot
+    error = (ref.ends - ref.com) - (robot.centres - robot.com)  # w_d − w, still in the world
+    rate = robot.centre_velocity - robot.com_velocity
+    return dot(along, gains.wheel_kp * error - gains.wheel_kd * rate)
 
 
 def swing_acceleration(robot: Go1Dynamics, ref: Reference, gains: Gains) -> np.ndarray:
@@ -170,15 +187,15 @@ def friction_pyramids(ground: Ground, contact: Contacts, wheels: np.ndarray) -> 
     its motion, so its pyramid is flat there.
     """
     resistance = ground.rolling_resistance * np.tanh(contact.velocity[:, 0] / ROLLING_SPEED)
-    grip = np.cos(np.pi / _SIDES) * ground.mu_foot
+    grip = _INSIDE * ground.mu_foot
     ahead = np.where(wheels, -resistance, grip)  # the largest λ_t / λ_n
     behind = np.where(wheels, resistance, grip)  # the largest −λ_t / λ_n
     aside = np.where(wheels, ground.mu_wheel_lateral, grip)
     corner = np.where(wheels, aside + np.abs(resistance), np.sqrt(2.0) * grip)
-    P = np.zeros((4, FRICTION_ROWS, 3))
+    P = np.empty((4, FRICTION_ROWS, 3))
     P[:, :_SIDES, :2] = _DIRECTIONS
-    P[:, :_SIDES, 2] = -np.stack([ahead, behind, aside, aside, corner, corner, corner, corner], axis=1)
-    P[:, _SIDES, 2] = -1.0
+    P[:, _SIDES, :2] = 0.0
+    P[:, :, 2] = -np.array([ahead, behind, aside, aside, corner, corner, corner, corner, _EACH]).T
     return P
 
 
@@ -195,29 +212,29 @@ def tasks(
     """
     G, g, weight = np.zeros((18, 18)), np.zeros(18), np.zeros(18)
     linear, angular = base_acceleration(robot, ref, gains)
-    basis = np.eye(3)
-    rolling = ref.stance & ref.wheels
-    if np.array_equal(rolling, ref.stance) and rolling.any():
+    rolling, swing = ref.stance & ref.wheels, ~ref.stance
+    weight[:3] = gains.com_weight
+    G[:3], g[:3] = robot.com_jacobian, linear - robot.com_drift
+    if rolling.any() and (rolling == ref.stance).all():
         basis = contact.basis[np.argmax(rolling)]
-        weight[1:3] = gains.com_weight  # no foot is down: nothing to push with along t
-    else:
-        weight[:3] = gains.com_weight
-    G[:3], g[:3] = basis @ robot.com_jacobian, basis @ (linear - robot.com_drift)
+        G[:3], g[:3] = basis @ G[:3], basis @ g[:3]
+        weight[0] = 0.0  # no foot is down: nothing to push with along t
     G[3:6, 3:6], g[3:6], weight[3:6] = robot.R_wb, angular, gains.attitude_weight
 
-    swing = ~ref.stance
-    wheel_task = wheel_acceleration(robot, ref, contact.basis[:, 0], gains)
-    relative = robot.centre_jacobian - robot.com_jacobian
-    along = np.einsum("li,lij->lj", contact.basis[:, 0], relative)
-    relative_drift = np.sum(contact.basis[:, 0] * (robot.centre_drift - robot.com_drift), axis=1)
-    legs_G, legs_g = G[6:].reshape(4, 3, 18), g[6:].reshape(4, 3)
-    legs_G[swing] = robot.centre_jacobian[swing]
-    legs_g[swing] = (swing_acceleration(robot, ref, gains) - robot.centre_drift)[swing]
-    legs_G[rolling, 0] = along[rolling]
-    legs_g[rolling, 0] = (wheel_task - relative_drift)[rolling]
-    legs_weight = weight[6:].reshape(4, 3)
-    legs_weight[swing] = gains.swing_weight
-    legs_weight[rolling, 0] = gains.wheel_weight
+    legs_G, legs_g, legs_weight = G[6:].reshape(4, 3, 18), g[6:].reshape(4, 3), weight[6:].reshape(4, 3)
+    if swing.any():
+        required = swing_acceleration(robot, ref, gains) - robot.centre_drift
+        legs_G[swing], legs_g[swing], legs_weight[swing] = (
+            robot.centre_jacobian[swing],
+            required[swing],
+            gains.swing_weight,
+        )
+    if rolling.any():
+        t = contact.basis[:, 0]
+        required = wheel_acceleration(robot, ref, t, gains) - dot(t, robot.centre_drift - robot.com_drift)
+        relative = t[:, None] @ (robot.centre_jacobian - robot.com_jacobian)
+        legs_G[rolling, 0], legs_g[rolling, 0] = relative[rolling, 0], required[rolling]
+        legs_weight[rolling, 0] = gains.wheel_weight
     return G, g, weight
 
 
@@ -262,7 +279,7 @@ class WholeBodyController:
         self._misses = 0
         self._last: Command | None = None
         self._integral = np.zeros(3)
-        self._program = QuadraticProgram(*_pattern(), solver)
+        self._program = QuadraticProgram(*_pattern(), solver, *_units())
 
     def problem(
         self, ref: Reference, ground: Ground
@@ -276,38 +293,38 @@ class WholeBodyController:
         robot, gains = self.robot, self.gains
         contact = contacts(robot, ground, ref.wheels)
         G, g, weight = tasks(robot, ref, contact, gains)
-        P, q = np.zeros((30, 30)), np.zeros(30)
+        P, q = np.zeros((30, 30)), np.empty(30)
         weighted = G.T * weight
         P[:18, :18] = weighted @ G
+        P.ravel()[_DIAGONAL[:18]] += gains.acceleration_weight
+        P.ravel()[_DIAGONAL[18:]] = gains.force_weight
         q[:18] = -weighted @ g
-        P[np.arange(30), np.arange(30)] += [gains.acceleration_weight] * 18 + [gains.force_weight] * 12
-        q[18:] = -gains.force_weight * np.einsum("lij,lj->li", contact.basis, ref.forces).ravel()
+        q[18:] = -gains.force_weight * (contact.basis @ ref.forces[:, :, None]).ravel()
 
-        A, lower, upper = np.zeros((_ROWS, 30)), np.full(_ROWS, -_FREE), np.full(_ROWS, _FREE)
         E, h = equations_of_motion(robot, contact)
+        A, lower, upper = np.zeros((_ROWS, 30)), np.empty(_ROWS), np.empty(_ROWS)
         A[:6], lower[:6], upper[:6] = E[:6], -h[:6], -h[:6]
-
         A[6:18, :18] = contact.jacobian.reshape(12, 18)
-        required = np.where(
-            ref.wheels[:, None],
-            fixed_wheels(contact, gains.contact_damping),
-            stationary_feet(contact, gains.contact_damping),
-        )
-        held = np.repeat(ref.stance[:, None], 3, axis=1)
-        held[:, 0] &= ~ref.wheels
-        lower[6:18] = np.where(held, required, -_FREE).ravel()
-        upper[6:18] = np.where(held, required, _FREE).ravel()
-
-        pyramids = friction_pyramids(ground, contact, ref.wheels)
-        for leg in range(4):
-            A[_FRICTION[leg], 18 + 3 * leg : 21 + 3 * leg] = pyramids[leg]
-        upper[_FRICTION] = 0.0
-        upper[_FRICTION[:, -1]] = np.where(ref.stance, -gains.least_force, 0.0)
-        lower[_FRICTION[:, -1]] = np.where(ref.stance, -_FREE, 0.0)  # a leg in the air presses on nothing
-
+        lower[6:18], upper[6:18] = self._held(ref, contact)
+        A.ravel()[_PYRAMIDS] = friction_pyramids(ground, contact, ref.wheels).ravel()
+        lower[_FRICTION], upper[_FRICTION] = -_FREE, 0.0
+        pressing = _FRICTION[:, -1]
+        upper[pressing] = np.where(ref.stance, -gains.least_force, 0.0)
+        lower[pressing] = np.where(ref.stance, -_FREE, 0.0)  # a leg in the air presses on nothing
         A[_TORQUES] = E[6:]
         lower[_TORQUES], upper[_TORQUES] = -robot.effort - h[6:], robot.effort - h[6:]
         return P, q, A, lower, upper, contact
+
+    def _held(self, ref: Reference, contact: Contacts) -> tuple[np.ndarray, np.ndarray]:
+        """Return bounds ``(12,)`` of the contacts' accelerations: legs in the air, and wheels along t, are free."""
+        damping = self.gains.contact_damping
+        required = stationary_feet(contact, damping)
+        if ref.wheels.any():
+            required = np.where(ref.wheels[:, None], fixed_wheels(contact, damping), required)
+        free = np.empty((4, 3), bool)
+        free[:] = ~ref.stance[:, None]
+        free[:, 0] |= ref.wheels
+        return np.where(free, -_FREE, required).ravel(), np.where(free, _FREE, required).ravel()
 
     @property
     def rescues(self) -> int:
@@ -323,8 +340,8 @@ class WholeBodyController:
         if u is None:
             return self._without_solution()
         torques = program[2][_TORQUES] @ u + self.robot.h[6:]
-        torques = np.clip(torques, -self.robot.effort, self.robot.effort)
-        forces = np.einsum("lij,li->lj", contact.basis, u[18:].reshape(4, 3))
+        torques = np.minimum(np.maximum(torques, -self.robot.effort), self.robot.effort)
+        forces = (u[18:].reshape(4, 1, 3) @ contact.basis)[:, 0]
         self._misses = 0
         self._last = Command(torques, u[:18], forces, True)
         return self._last
@@ -337,7 +354,8 @@ class WholeBodyController:
         gains = self.gains
         if ref.stance.sum() >= 3:
             self._integral += TICK * gains.attitude_ki * attitude_error(self.robot, ref)
-            self._integral = np.clip(self._integral, -gains.most_integral, gains.most_integral)
+            most = gains.most_integral
+            self._integral = np.minimum(np.maximum(self._integral, -most), most)
         else:
             self._integral *= 1.0 - TICK / gains.integral_fade
 
@@ -365,6 +383,18 @@ def _pattern() -> tuple[np.ndarray, np.ndarray]:
         A[_FRICTION[leg][:_SIDES, None], force[:2]] = _DIRECTIONS != 0.0
         A[_FRICTION[leg], force[2]] = True
     return P, A
+
+
+def _units() -> tuple[np.ndarray, np.ndarray]:
+    """Return the units of unknowns and rows, ``(30,)`` and ``(66,)``: tens of newtons and newton metres.
+
+    Accelerations of joints and forces are then numbers of one size. On 5500 programs of three plans (flat, feet
+    only, up the ramp) OSQP takes 77 iterations in the mean instead of 175, and fails once instead of 64 times.
+    """
+    unknowns, rows = np.ones(30), np.ones(_ROWS)
+    unknowns[18:] = _FORCE_UNIT
+    rows[_FRICTION] = rows[_TORQUES] = _FORCE_UNIT
+    return unknowns, rows
 
 
 def weight_share(robot: Go1Dynamics, acceleration: np.ndarray, stance: np.ndarray) -> np.ndarray:
