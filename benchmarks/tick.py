@@ -1,6 +1,7 @@
 """How long a control tick takes, part by part: ``python benchmarks/tick.py``.
 
-The robot stands on two wheels and a foot, swings the fourth leg and sways at 1.5 Hz.
+The robot stands on two wheels and a foot, swings the fourth leg and sways at 1.5 Hz. Then it executes a
+stored plan, on estimates: there a tick has the tracker's work, too, and contacts come and go.
 """
 
 import time
@@ -8,9 +9,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wfbook import wbc
+from wfbook import simulate, wbc
 from wfbook.go1 import FOOT_RADIUS, nominal
 from wfbook.go1_dynamics import Go1Dynamics
+from wfbook.planner import stored
+from wfbook.qp import QuadraticProgram
 from wfbook.reference import Ground, Reference
 from wfbook.terrain import flat
 
@@ -62,6 +65,35 @@ def main() -> None:
     for name, work in parts.items():
         durations = timed(work)
         print(f"{name:34s} {np.median(durations):6.0f} us {np.percentile(durations, 99):6.0f} us")
+    execute()
+
+
+def execute() -> None:
+    """Print the times of a run, and OSQP's iterations on the run's programs with units and without."""
+    programs: list[tuple[np.ndarray, ...]] = []
+    solve = QuadraticProgram.solve
+
+    def recorded(self: QuadraticProgram, *program: np.ndarray) -> np.ndarray | None:
+        programs.append(program)
+        return solve(self, *program)
+
+    plan = stored("flat")
+    run = simulate.run(plan, state="estimated")
+    for name in ("tick", "estimator"):
+        durations = 1e3 * run.times[name]
+        print(
+            f"{'in a run: ' + name:34s} {np.median(durations):6.0f} us {np.percentile(durations, 99):6.0f} us"
+        )
+    print(f"simulated time over wall time      {run.metrics['real_time_factor']:6.2f}")
+    QuadraticProgram.solve = recorded
+    simulate.run(plan, state="estimated")
+    QuadraticProgram.solve = solve
+    for name, units in (("with units", wbc.units()), ("without", ())):
+        program = QuadraticProgram(*wbc.pattern(), "osqp", *units)
+        for data in programs:
+            program.solve(*data)
+        mean = program.iterations / len(programs)
+        print(f"OSQP {name:29s} {mean:6.0f} iterations a tick, {program.rescues} of {len(programs)} unsolved")
 
 
 if __name__ == "__main__":

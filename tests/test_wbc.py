@@ -105,7 +105,7 @@ def test_osqp_and_an_exact_solver_agree_in_closed_loop(monkeypatch):
     for plan in (handmade.trot(0.3, 5), handmade.coast(10)):
         seen.clear()
         simulate.run(plan, hold=0.2)
-        P_pattern, A_pattern = wbc._pattern()
+        P_pattern, A_pattern = wbc.pattern()
         exact = QuadraticProgram(P_pattern, A_pattern, "daqp")
         for program, u in seen[::3]:
             errors.append(np.abs(program[2][-12:] @ (u - solve(exact, *program))).max())
@@ -116,7 +116,7 @@ def test_osqp_and_an_exact_solver_agree_in_closed_loop(monkeypatch):
 @pytest.mark.parametrize("mode", MODES)
 def test_the_sparsity_pattern_misses_nothing(robot, ground, mode):
     P, _, A, *_ = wbc.WholeBodyController(robot).problem(situation(robot, *MODES[mode], 5), ground)
-    P_pattern, A_pattern = wbc._pattern()
+    P_pattern, A_pattern = wbc.pattern()
     assert not np.any(P[~P_pattern]) and not np.any(np.abs(A[~A_pattern]) > 1e-12)
 
 

@@ -22,9 +22,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
+from scipy.linalg.lapack import dposv
 
 from wfbook.go1 import IMU_POSITION, leg_kinematics
-from wfbook.go1_dynamics import cross
+from wfbook.go1_dynamics import cross, dot
 from wfbook.leg_odometry import (
     ACCELEROMETER_BIAS,
     BIASES,
@@ -53,6 +54,12 @@ TOUCH = 3.0
 """Force at which a leg feels the ground, N."""
 
 _ONE = np.eye(3)
+_EACH_JOINT = np.ones((4, 1, 3))
+_BLOCKS = np.arange(12).reshape(4, 3)
+_OWN_BLOCKS = [3 * n * _BLOCKS[:n, :, None] + _BLOCKS[:n, None, :] for n in (1, 2, 3, 4)]
+"""Where the 3 by 3 blocks of n legs stand in a matrix of 3 n columns whose rows stand one after the other."""
+_END_BLOCKS = STATES * (ENDS.start + _BLOCKS[:, :, None]) + ENDS.start + _BLOCKS[:, None, :]
+"""Where the legs' ends' own blocks stand in the covariance, likewise."""
 
 
 @dataclass(frozen=True)
@@ -176,7 +183,7 @@ class Estimator:
         spin = (turning @ reading.joint_rates[:, :, None])[:, :, 0]
         axles = turning[:, :, 2]
         if self.wheel_model == "encoder":
-            spin = spin + np.where(wheels, reading.wheel_rates, 0.0)[:, None] * axles
+            spin = spin + (wheels * reading.wheel_rates)[:, None] * axles
         rolls = self.trusted & ~(wheels & (self.wheel_model == "printed"))
         rolling = Rolling(spin, axles, normals, wheels, rolls)
         self.state, F = propagate(self.state, reading, rolling, dt)
@@ -186,16 +193,15 @@ class Estimator:
         P += (G * self._white) @ G.T
         P[BIASES, BIASES] += self._walk
         arms = F[ENDS, GYRO_BIAS].reshape(4, 3, 3) @ turning  # the joints turn a calf as the trunk does
-        rates = np.full((4, 1, 3), noise.joint_rate**2)
-        slip = dt * np.where(wheels, tuning.wheel_slip, tuning.foot_slip) ** 2
+        rates = noise.joint_rate**2 * _EACH_JOINT
+        slip = dt * np.where(wheels, tuning.wheel_slip**2, tuning.foot_slip**2)
         if self.wheel_model == "encoder":
-            rates[:, 0, 2] += np.where(wheels, noise.wheel_rate**2, 0.0)
+            rates[:, 0, 2] += noise.wheel_rate**2 * wheels
         Q = (arms * rates) @ arms.transpose(0, 2, 1) + slip[:, None, None] * _ONE
         if self.wheel_model == "slack":
             t = cross(axles @ self.state.R_wb.T, normals) * wheels[:, None]
             Q += tuning.slack**2 * dt * t[:, :, None] * t[:, None, :]
-        for leg in np.flatnonzero(self.trusted):
-            P[LEG_END[leg], LEG_END[leg]] += Q[leg]
+        P.ravel()[_END_BLOCKS] += self.trusted[:, None, None] * Q
         self.covariance = P
 
     def _place(self, leg: int, end: np.ndarray, noise: np.ndarray, printed: np.ndarray) -> None:
@@ -222,18 +228,20 @@ class Estimator:
         H, innovations = H[legs].reshape(-1, STATES), (ends - expected)[legs]
         HP = H @ self.covariance
         S = HP @ H.T
-        blocks = np.arange(len(S)).reshape(-1, 3)
-        own = blocks[:, :, None], blocks[:, None, :]
-        S[own] += noise[legs]
-        distances = (innovations * np.linalg.solve(S[own], innovations[:, :, None])[:, :, 0]).sum(axis=1)
+        blocks, own = _BLOCKS[: len(legs)], _OWN_BLOCKS[len(legs) - 1]
+        single = S.take(own) + noise[legs]
+        S.ravel()[own] = single
+        distances = dot(innovations, np.linalg.solve(single, innovations[:, :, None])[:, :, 0])
         good = distances < self.tuning.gate
         self._refused[legs] = np.where(good, 0, self._refused[legs] + 1)
         innovations = innovations.ravel()
         if not good.all():
             self.outliers += int(np.sum(~good))
+            if not good.any():
+                return
             rows = blocks[good].ravel()
             S, HP, innovations = S[np.ix_(rows, rows)], HP[rows], innovations[rows]
-        K = np.linalg.solve(S, HP).T
+        K = dposv(S, HP)[1].T  # S is symmetric and positive definite: LAPACK's Cholesky solver
         self.state = self.state.plus(K @ innovations)
         P = self.covariance - K @ HP
         self.covariance = 0.5 * (P + P.T)

@@ -46,7 +46,7 @@ _KEPT_KEPT, _KEPT_WHEELS = 22 * _KEPT[:, None] + _KEPT, 22 * _KEPT[:, None] + WH
 
 def skew(vectors: np.ndarray) -> np.ndarray:
     """Return the matrices ``[v]×`` with ``[v]× u = v × u``, shape ``(..., 3, 3)`` of ``(..., 3)``."""
-    return (vectors @ _SKEW).reshape(vectors.shape + (3,))
+    return (vectors @ _SKEW).reshape((*vectors.shape, 3))
 
 
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 
 from wfbook.go1 import FOOT_RADIUS, WHEEL_RADIUS
-from wfbook.go1_dynamics import GRAVITY, WHEEL_FLATNESS, contact_offsets, cross, skew
+from wfbook.go1_dynamics import GRAVITY, WHEEL_FLATNESS, contact_offsets, cross, dot, skew
 from wfbook.sensors import Reading
 
 STATES = 27
@@ -27,7 +27,7 @@ BIASES, ENDS = slice(9, 15), slice(15, STATES)
 LEG_END = [slice(15 + 3 * leg, 18 + 3 * leg) for leg in range(4)]
 """Where each part stands in the error."""
 
-_ONE = np.eye(3)
+_ONE, _UNMOVED = np.eye(3), np.eye(STATES)
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ class Rolling:
         axles = self.axles @ R_wb.T
         lever = -contact_offsets(axles, self.normals, self.wheels) * self.rolls[:, None]
         flat = np.where(self.wheels & self.rolls, WHEEL_FLATNESS, 0.0)[:, None]
-        camber = (axles * self.normals).sum(axis=1, keepdims=True)
+        camber = dot(axles, self.normals)[:, None]
         square = WHEEL_RADIUS**2 - flat * camber**2
         lean = flat / np.sqrt(square)
         along = flat * camber / square * lever - lean * axles
@@ -152,7 +152,7 @@ def propagate(
         state.gyro_bias,
         state.p + dt * cross(omega, lever),
     )
-    F = np.eye(STATES)
+    F = _UNMOVED.copy()
     faster = np.empty((3, 9))  # acceleration by orientation, accelerometer's and gyro's bias
     faster[:, :3] = -skew(force_w)
     faster[:, 3:6] = -R

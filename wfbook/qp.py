@@ -33,13 +33,14 @@ class QuadraticProgram:
         P_pattern: ``(n, n)`` bool, where P may be non-zero.
         A_pattern: ``(m, n)`` bool, where A may be non-zero.
         solver: ``"osqp"``, or ``"daqp"`` for every program.
-        units: ``(n,)`` of each unknown: how large OSQP's 1 is. OSQP walks all unknowns and rows at one step size,
-            so it needs the fewer steps the more alike they are. (Its own scaling makes all columns and rows of
-            the first program alike, which is not that, and costs a new scaling at every update.)
+        units: ``(n,)`` of each unknown, in which OSQP counts it. OSQP has one step size for all unknowns and
+            rows, so it needs the fewer steps the more alike they are. (Its own scaling evens out columns and
+            rows of the matrices, not the answer's numbers, and costs a new scaling at every update.)
         row_units: ``(m,)`` of each row of A.
 
     Attributes:
         rescues: how many programs OSQP left to DAQP.
+        iterations: OSQP's, over all programs.
     """
 
     def __init__(
@@ -64,7 +65,7 @@ class QuadraticProgram:
         self._P = sparse.csc_matrix(np.triu(P_pattern).astype(float))
         self._A = sparse.csc_matrix(A_pattern.astype(float))
         self._osqp: osqp.OSQP | None = None
-        self.rescues = 0
+        self.rescues = self.iterations = 0
 
     def solve(
         self, P: np.ndarray, q: np.ndarray, A: np.ndarray, lower: np.ndarray, upper: np.ndarray
@@ -90,6 +91,7 @@ class QuadraticProgram:
         else:
             self._osqp.update(q=q, l=lower, u=upper, Px=P_values, Ax=A_values)
         result = self._osqp.solve(raise_error=False)
+        self.iterations += result.info.iter
         if result.info.status_val not in (1, 2) or not math.isfinite(result.x.sum()):
             self._osqp = None
             return None

@@ -224,11 +224,8 @@ def tasks(
     legs_G, legs_g, legs_weight = G[6:].reshape(4, 3, 18), g[6:].reshape(4, 3), weight[6:].reshape(4, 3)
     if swing.any():
         required = swing_acceleration(robot, ref, gains) - robot.centre_drift
-        legs_G[swing], legs_g[swing], legs_weight[swing] = (
-            robot.centre_jacobian[swing],
-            required[swing],
-            gains.swing_weight,
-        )
+        legs_G[swing], legs_g[swing] = robot.centre_jacobian[swing], required[swing]
+        legs_weight[swing] = gains.swing_weight
     if rolling.any():
         t = contact.basis[:, 0]
         required = wheel_acceleration(robot, ref, t, gains) - dot(t, robot.centre_drift - robot.com_drift)
@@ -279,7 +276,7 @@ class WholeBodyController:
         self._misses = 0
         self._last: Command | None = None
         self._integral = np.zeros(3)
-        self._program = QuadraticProgram(*_pattern(), solver, *_units())
+        self._program = QuadraticProgram(*pattern(), solver, *units())
 
     def problem(
         self, ref: Reference, ground: Ground
@@ -287,8 +284,8 @@ class WholeBodyController:
         """Return the program of Paper A, eqs 38–43, at the robot's state.
 
         Returns:
-            P ``(30, 30)``, q ``(30,)``, A ``(66, 30)``, l and c ``(66,)`` of ``min ½ uᵀP u + qᵀu`` subject to
-            ``l ≤ A u ≤ c``, and the contacts.
+            P ``(30, 30)``, q ``(30,)``, A ``(66, 30)``, l and c ``(66,)`` of ``min ½ uᵀP u + qᵀu``
+            subject to ``l ≤ A u ≤ c``, and the contacts.
         """
         robot, gains = self.robot, self.gains
         contact = contacts(robot, ground, ref.wheels)
@@ -316,7 +313,7 @@ class WholeBodyController:
         return P, q, A, lower, upper, contact
 
     def _held(self, ref: Reference, contact: Contacts) -> tuple[np.ndarray, np.ndarray]:
-        """Return bounds ``(12,)`` of the contacts' accelerations: legs in the air, and wheels along t, are free."""
+        """Return bounds ``(12,)`` of the contacts' accelerations; in the air, and along a wheel's t, none."""
         damping = self.gains.contact_damping
         required = stationary_feet(contact, damping)
         if ref.wheels.any():
@@ -368,7 +365,7 @@ class WholeBodyController:
         return Command(-2.0 * self.robot.velocity[6:], np.zeros(18), np.zeros((4, 3)), False)
 
 
-def _pattern() -> tuple[np.ndarray, np.ndarray]:
+def pattern() -> tuple[np.ndarray, np.ndarray]:
     """Return where P and A can be non-zero, whatever the mode: ``(30, 30)`` and ``(66, 30)`` bool."""
     P, A = np.zeros((30, 30), bool), np.zeros((_ROWS, 30), bool)
     P[:18, :18] = True
@@ -385,11 +382,11 @@ def _pattern() -> tuple[np.ndarray, np.ndarray]:
     return P, A
 
 
-def _units() -> tuple[np.ndarray, np.ndarray]:
+def units() -> tuple[np.ndarray, np.ndarray]:
     """Return the units of unknowns and rows, ``(30,)`` and ``(66,)``: tens of newtons and newton metres.
 
-    Accelerations of joints and forces are then numbers of one size. On 5500 programs of three plans (flat, feet
-    only, up the ramp) OSQP takes 77 iterations in the mean instead of 175, and fails once instead of 64 times.
+    Accelerations and forces are then numbers of one size, and OSQP takes half as many iterations
+    (``benchmarks/tick.py``).
     """
     unknowns, rows = np.ones(30), np.ones(_ROWS)
     unknowns[18:] = _FORCE_UNIT
