@@ -152,20 +152,20 @@ class Broken:
     """A rule that S and D break.
 
     Attributes:
-        equation: of Paper A, as "16".
+        rule: its name, as "eq. 16".
         leg: index, or None where the rule concerns all legs.
         slot: index.
         reason: in words.
     """
 
-    equation: str
+    rule: str
     leg: int | None
     slot: int
     reason: str
 
     def __str__(self) -> str:
         who = "" if self.leg is None else f"{LEGS[self.leg]}, "
-        return f"eq. {self.equation}: {who}slot {self.slot}: {self.reason}"
+        return f"{self.rule}: {who}slot {self.slot}: {self.reason}"
 
 
 def broken_rules(S: np.ndarray, D: np.ndarray, start: np.ndarray) -> list[Broken]:
@@ -187,14 +187,14 @@ def broken_rules(S: np.ndarray, D: np.ndarray, start: np.ndarray) -> list[Broken
             chosen = int(D[leg, j].sum())
             if chosen != 1:
                 found.append(
-                    Broken("17", leg, j, f"D has {chosen or 'no'} entries of 1, it must have exactly one")
+                    Broken("eq. 17", leg, j, f"D has {chosen or 'no'} entries of 1, it must have exactly one")
                 )
             if not S[leg, j] and not np.array_equal(D[leg, j], before[leg]):
                 was, now = _entries(before[leg]), _entries(D[leg, j])
-                found.append(Broken("16", leg, j, f"the leg stands, but D changes from {was} to {now}"))
+                found.append(Broken("eq. 16", leg, j, f"the leg stands, but D changes from {was} to {now}"))
         if len(S) == len(LEGS) and S[:, j].all():
             found.append(
-                Broken("12", None, j, "all legs swing, the centroid has no contact to be the mean of")
+                Broken("eq. 12", None, j, "all legs swing, the centroid has no contact to be the mean of")
             )
     return found
 
