@@ -17,13 +17,37 @@ import numpy as np
 
 from wfbook.modes import END_EFFECTORS, Broken, regions_allowed
 from wfbook.swing import quintic_basis, septic_basis
-from wfbook.terrain import Terrain
+from wfbook.terrain import Region, Terrain
 
 _PRICE = {"place": 10.0, "reach": 100.0, "step": 100.0}
 """Of a metre by which a rule is broken; a metre between hip and contact at the end of a slot costs 1."""
 
 _BROKEN = 1e-4
 _SAMPLES = 8  # points of a drawn path between two knots
+
+
+def bank_and_deck(gap: float = 0.15) -> Terrain:
+    """Return a bank, a gap, and a deck of two regions in one group, of which the second slopes down.
+
+    Args:
+        gap: between bank and deck, along x.
+    """
+    profile = [
+        (-0.5, 0.12, 0.0, 0.0, "bank"),
+        (0.12, 0.45, 0.0, 0.0, "deck"),
+        (0.45, 1.4, 0.0, -0.08, "deck"),
+    ]
+    regions = []
+    for begin, end, low, high, group in profile:
+        shift = 0.0 if group == "bank" else gap
+        edges = [
+            (begin + shift, -1, low),
+            (end + shift, -1, high),
+            (end + shift, 1, high),
+            (begin + shift, 1, low),
+        ]
+        regions.append(Region(edges, 0.7, 0.0, 0.7, 0.0, group))
+    return Terrain("bank and deck", tuple(regions))
 
 
 @dataclass(frozen=True)
