@@ -80,23 +80,25 @@ def least_m(find: Callable[[np.ndarray, float, np.ndarray, np.ndarray], Any]) ->
         a, low = rng.normal(size=n), rng.normal(size=n)
         high = low + rng.uniform(0.1, 2.0, n)
         b = float(a @ rng.uniform(low - 1.0, high + 1.0))
-        M = number(called(find, a, b, low, high, name="your function"), "M")
+        big = number(called(find, a, b, low, high, name="your function"), "M")
         corners = np.array(list(product(*zip(low, high, strict=True))))
         over = corners @ a - b
         worst = int(over.argmax())
         data = (
             f"a = {a.round(2).tolist()}, b = {b:.2f}, box {low.round(2).tolist()} to {high.round(2).tolist()}"
         )
-        if M < over[worst] - _EXACT:
+        if big < over[worst] - _EXACT:
             at = corners[worst].round(2).tolist()
-            raise WrongAnswer(f"{data}: at D = 0 your M = {M:.3f} forbids p = {at}, a real place for the leg")
-        if M > max(over[worst], 0.0) + _EXACT:
             raise WrongAnswer(
-                f"{data}: M = {M:.3f} is {M - max(over[worst], 0.0):.3f} more than any corner needs"
+                f"{data}: at D = 0 your M = {big:.3f} forbids p = {at}, a real place for the leg"
             )
-        if M < 0:
+        if big > max(over[worst], 0.0) + _EXACT:
             raise WrongAnswer(
-                f"{data}: M = {M:.3f}; below 0 it makes the row at D = ½ stricter than at D = 1"
+                f"{data}: M = {big:.3f} is {big - max(over[worst], 0.0):.3f} more than any corner needs"
+            )
+        if big < 0:
+            raise WrongAnswer(
+                f"{data}: M = {big:.3f}; below 0 it makes the row at D = ½ stricter than at D = 1"
             )
     return "nothing is cut off, and some corner of each box touches its row: no smaller M would do"
 
