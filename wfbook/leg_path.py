@@ -34,8 +34,8 @@ def bank_and_deck(gap: float = 0.15) -> Terrain:
     """
     profile = [
         (-0.5, 0.12, 0.0, 0.0, "bank"),
-        (0.12, 0.45, 0.0, 0.0, "deck"),
-        (0.45, 1.4, 0.0, -0.08, "deck"),
+        (0.12, 0.47, 0.0, 0.0, "deck"),
+        (0.47, 1.4, 0.0, -0.08, "deck"),
     ]
     regions = []
     for begin, end, low, high, group in profile:

@@ -36,15 +36,19 @@ def rows_table(plan: "Plan", leg: str) -> str:
         leg: its name.
 
     Returns:
-        One line for S and one for each region and end effector of D; zeros are white.
+        One line for S, one for each region and end effector of D; zeros are white. On several regions the
+        lines of D without a 1 are left out, and one more line says which region is under the contact when a
+        slot ends.
     """
     index = LEGS.index(leg)
-    lines = [(f"S, {leg} swings", plan.S[index], SWING)]
-    for region in range(plan.D.shape[2]):
-        where = f", region {region}" if plan.D.shape[2] > 1 else ""
-        for e, colour in enumerate((FOOT, WHEEL)):
-            lines.append((f"D, {END_EFFECTORS[e]}{where}", plan.D[index, :, region, e], colour))
-    lines.insert(0, ("slot", np.arange(plan.slots), PAPER))
+    D, several = plan.D[index], plan.D.shape[2] > 1
+    lines = [("slot", np.arange(plan.slots), PAPER), (f"S, {leg} swings", plan.S[index], SWING)]
+    for region, e in np.ndindex(D.shape[1:]):
+        if not several or D[:, region, e].any():
+            where = f", region {region}" if several else ""
+            lines.append((f"D, {END_EFFECTORS[e]}{where}", D[:, region, e], (FOOT, WHEEL)[e]))
+    if several:
+        lines.append(("region under it", np.array(plan.meta["regions"][index]), PAPER))
     rows = []
     for name, values, colour in lines:
         cells = "".join(_cell(plan, j, int(value), colour) for j, value in enumerate(values))
