@@ -95,12 +95,12 @@ class LegEditor(Panel):
             layout=ipywidgets.Layout(grid_template_columns=f"190px repeat({slots}, 56px)"),
         )
         self._set(*_rows(self.ride, *EXAMPLES[self.example.value]))
+        self.example.observe(self._chosen, names="value")  # before the panel's own, which redraws
         super().__init__(
             [self.example, self.speed, self.keep, grid, ipywidgets.HTML(_CELLS)], ["time", "side"]
         )
         for cell in (*self.swing, *self.dynamics.values()):
             cell.observe(self._clicked, names="value")
-        self.example.observe(self._chosen, names="value")
 
     @property
     def S(self) -> np.ndarray:
@@ -125,7 +125,6 @@ class LegEditor(Panel):
 
     def _chosen(self, _change: object) -> None:
         self._set(*_rows(self.ride, *EXAMPLES[self.example.value]))
-        self._follow()
 
     def _clicked(self, change: dict) -> None:
         if self._setting:
