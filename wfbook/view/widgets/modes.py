@@ -86,7 +86,9 @@ class LegEditor(Panel):
         self.broken: list[Broken] = []
         self.path: LegPath | None = None
         self._setting = False
-        lines = [("slot", [ipywidgets.Label(str(j)) for j in range(slots)]), ("S: swings", self.swing)]
+        centre = {"justify_content": "center"}
+        numbers = [ipywidgets.Label(str(j), layout=centre) for j in range(slots)]
+        lines = [("slot", numbers), ("S: swings", self.swing)]
         for r, e in kinds:
             name = f"D: region {r} ({self.ride.terrain.regions[r].group}), {END_EFFECTORS[e]}"
             lines.append((name, [self.dynamics[j, r, e] for j in range(slots)]))
@@ -353,7 +355,7 @@ def _draw_relaxation(axes: object, step: OneStep, polygon: np.ndarray, best: np.
 
 
 class Stones(Panel):
-    """A foot that is on three stones by halves: where big-M with the least M lets it be, and where the hull.
+    """A foot on three stones by halves: where big-M with the least M lets it be, and where the hull.
 
     Attributes:
         first: share of the first stone.
