@@ -86,8 +86,7 @@ class LegEditor(Panel):
         self.broken: list[Broken] = []
         self.path: LegPath | None = None
         self._setting = False
-        centre = {"justify_content": "center"}
-        numbers = [ipywidgets.Label(str(j), layout=centre) for j in range(slots)]
+        numbers = [ipywidgets.Label(str(j), layout={"justify_content": "center"}) for j in range(slots)]
         lines = [("slot", numbers), ("S: swings", self.swing)]
         for r, e in kinds:
             name = f"D: region {r} ({self.ride.terrain.regions[r].group}), {END_EFFECTORS[e]}"
