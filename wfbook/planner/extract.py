@@ -6,7 +6,7 @@ import cvxpy as cp
 import numpy as np
 
 from wfbook.centroidal import Robot, bound_terms
-from wfbook.modes import END_EFFECTORS, LEGS
+from wfbook.modes import END_EFFECTORS, LEGS, contact_centroid, dynamics_matrix
 from wfbook.planner.conic import Conic
 from wfbook.planner.gait import Gait
 from wfbook.planner.plan import Plan
@@ -57,8 +57,6 @@ def plan_of(problem: Problem, values: dict[str, Any], gait: Gait, meta: dict[str
                 excess = np.maximum(total[i] - squares[i].sum(axis=1), 0.0)
                 squares[i] += excess[:, None] / len(LEGS)
     S = np.asarray(gait.S, np.int8)
-    stands = np.repeat(1 - S.T, problem.knots_per_slot, axis=0)
-    c = (stands[..., None] * world["p"][1:]).sum(axis=1) / stands.sum(axis=1)[:, None]
     return Plan(
         t=problem.dt * np.arange(problem.knots + 1),
         **world,
@@ -67,22 +65,11 @@ def plan_of(problem: Problem, values: dict[str, Any], gait: Gait, meta: dict[str
         U_plus=weight * np.stack(sides[0], axis=-1),
         U_minus=weight * np.stack(sides[1], axis=-1),
         S=S,
-        D=_dynamics_matrix(problem, gait),
-        c=c,
+        D=dynamics_matrix(*gait, problem.start_regions, problem.ground.count),
+        c=contact_centroid(world["p"][1:], S),
         terrain=problem.terrain,
         meta=describe(problem) | {"regions": np.asarray(gait.region).tolist()} | meta,
     )
-
-
-def _dynamics_matrix(problem: Problem, gait: Gait) -> np.ndarray:
-    """Return D, ``(L, J, R, E)``; a wheel keeps the region where it touched down (eq. 16)."""
-    D = np.zeros((*gait.S.shape, problem.ground.count, len(END_EFFECTORS)), np.int8)
-    for leg, region in enumerate(problem.start_regions):
-        for j in range(gait.S.shape[1]):
-            if gait.S[leg, j] or not gait.wheel[leg, j]:
-                region = gait.region[leg, j]
-            D[leg, j, region, int(gait.wheel[leg, j])] = 1
-    return D
 
 
 def gait_of(plan: Plan) -> Gait:

@@ -90,6 +90,7 @@ def page(
     title: str = "replay",
     legend: dict[str, str] | None = None,
     start: float = 0.0,
+    beside: str = "",
 ) -> str:
     """Return a self-contained HTML page that shows the commands and plays their animation.
 
@@ -98,6 +99,8 @@ def page(
         title: of the page.
         legend: colour for each name, shown in a corner.
         start: what the clock shows at the animation's first frame.
+        beside: HTML over the picture's right corner. Its elements with ``data-from`` and ``data-to``, in
+            seconds of the clock, have the class "now" in between.
 
     Returns:
         HTML that asks no server for anything; the same commands give the same text.
@@ -110,6 +113,7 @@ def page(
         title=html.escape(title),
         legend=entries,
         start=f"{start:g}",
+        beside=beside,
         script=_read("player.js"),
         viewer=_viewer(),
         commands=_text(pack(commands)),

@@ -44,6 +44,15 @@ class Player {
     element("time").value = this.time;
     const shown = (value) => (value + this.start).toFixed(2);
     element("clock").textContent = shown(this.time) + " / " + shown(this.duration) + " s";
+    this.mark(this.time + this.start);
+  }
+
+  // What stands beside the picture and belongs to a stretch of time is marked while that lasts.
+  mark(now) {
+    for (const part of element("beside").querySelectorAll("[data-from]")) {
+      const { from, to } = part.dataset;
+      part.classList.toggle("now", Number(from) <= now && now < Number(to));
+    }
   }
 
   play(playing = true) {

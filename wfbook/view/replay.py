@@ -36,18 +36,19 @@ _ARROW_LENGTH = 0.5
 _SMALLEST_FORCE = 1.0
 
 
-def html(motion: "Run | Plan", title: str | None = None) -> str:
+def html(motion: "Run | Plan", title: str | None = None, beside: str = "") -> str:
     """Return a self-contained page that replays a run or a plan.
 
     Args:
         motion: what to replay.
         title: of the page; by default the terrain's name.
+        beside: HTML beside the picture (see :func:`.meshcat_static.page`).
     """
     shown = motion_of_run(motion) if hasattr(motion, "qpos") else motion_of_plan(motion)
     legend = {"foot": FOOT, "wheel": WHEEL, "contact force": FORCE, "CoM planned": PLANNED}
     if shown.measured_com is not None:
         legend["CoM measured"] = MEASURED
-    return page(commands(shown), title or f"replay: {shown.terrain.name}", legend, shown.start)
+    return page(commands(shown), title or f"replay: {shown.terrain.name}", legend, shown.start, beside)
 
 
 def save(motion: "Run | Plan", path: str | os.PathLike, title: str | None = None) -> None:
@@ -65,10 +66,11 @@ class Replay:
     Args:
         motion: what to replay.
         height: of the frame, in pixels.
+        beside: HTML beside the picture (see :func:`.meshcat_static.page`).
     """
 
-    def __init__(self, motion: "Run | Plan", height: int = 420) -> None:
-        self._html = frame(html(motion), height)
+    def __init__(self, motion: "Run | Plan", height: int = 420, beside: str = "") -> None:
+        self._html = frame(html(motion, beside=beside), height)
 
     def _repr_html_(self) -> str:
         return self._html

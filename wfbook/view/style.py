@@ -19,6 +19,8 @@ PAPER = "#FFFFFF"
 INK = "#222222"
 BODY = "#8A919C"
 PALE = "#BBBBBB"
+LIMIT = "#D55E00"  # what may not be crossed, and what crosses it: red says stop
+RELAXED = "#F0E442"  # what a relaxation allows besides the truth: the one hue that nothing else has
 
 SWINGING = 2
 """Mode of a leg in the air, beside the end effectors' 0 (foot) and 1 (wheel)."""
