@@ -80,3 +80,42 @@ def test_moving_a_handle_tells_who_watches(board):
 def test_a_browser_can_not_send_what_is_no_point(board, points):
     with pytest.raises(traitlets.TraitError):
         board.points = points
+
+
+def test_a_handle_stays_within_its_own_limits_whoever_moves_it():
+    board = Board({"foot": (1.0, 0.0)}, limits={"foot": (0.0, 2.0, 0.0, 0.0)})
+    board.move("foot", 3.0, 0.7)
+    assert board.points["foot"] == [2.0, 0.0], "it slides along the ground"
+    board.points = {"foot": [-5, -5]}  # what a browser sends
+    assert board.points["foot"] == [0.0, 0.0]
+
+
+def test_a_carried_handle_moves_along_but_not_the_other_way_round():
+    board = Board({"foot": (1.0, 0.0), "tip": (1.5, 1.0)}, carriers={"tip": "foot"})
+    board.move("foot", 2.0, 0.0)
+    assert board.points == {"foot": [2.0, 0.0], "tip": [2.5, 1.0]}
+    board.move("tip", 3.0, 2.0)
+    assert board.points == {"foot": [2.0, 0.0], "tip": [3.0, 2.0]}
+
+
+@pytest.mark.parametrize("option", ["colours", "limits", "carriers"])
+def test_a_handle_that_there_is_none_of_is_refused(option):
+    with pytest.raises(ValueError, match="no handle 'knee'"):
+        Board({"foot": (1.0, 0.0)}, **{option: {"knee": "foot"}})
+
+
+def test_the_layout_does_not_change_under_the_hand():
+    def draw(label):
+        picture = Picture(3, 2)
+        axes = picture.subplots(1, 2)
+        axes[0].set(xlim=(0, 3), ylim=(-1, 1))
+        axes[1].set_ylabel(label)
+        return picture, axes[0], "a field"
+
+    board = Board({"foot": (1.0, 0.0)})
+    board.show(*draw(""))
+    frame, image = board._frame, board._image
+    board.show(*draw("two\nlines"))
+    assert board._frame == frame and board._image != image
+    board.show(Picture(3, 2), Picture(3, 2).subplots(), "another kind of picture")
+    assert board._frame != frame

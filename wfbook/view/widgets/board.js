@@ -1,29 +1,46 @@
 // The browser's half of wfbook.view.widgets.board.Board: handles over a picture that the kernel draws.
 const SVG = "http://www.w3.org/2000/svg";
 const KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+const PATIENCE = 2000;
+
+function shape(kind, attributes, style, parent) {
+  const element = document.createElementNS(SVG, kind);
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  element.style.cssText = style;
+  parent.append(element);
+  return element;
+}
 
 function render({ model, el }) {
   const board = document.createElement("div");
   const picture = document.createElement("img");
-  const handles = document.createElementNS(SVG, "svg");
   board.className = "wfbook-board";
   board.style.cssText = "position:relative;max-width:100%";
+  // JupyterLab would take the arrow keys for itself.
+  board.dataset.lmSuppressShortcuts = "true";
   picture.style.cssText = "width:100%;display:block;user-select:none;pointer-events:none";
-  handles.style.cssText = "position:absolute;left:0;top:0;width:100%;height:100%;touch-action:none";
-  board.append(picture, handles);
+  board.append(picture);
   el.append(board);
+  // Only the handles catch the pointer: a finger beside them scrolls the page.
+  const style = "position:absolute;left:0;top:0;width:100%;height:100%;pointer-events:none";
+  const overlay = shape("svg", {}, style, board);
+  const arrows = shape("g", {}, "", overlay);
+  const circles = {};
+  const lines = {};
 
-  // One change is on its way to the kernel at a time: the next leaves when its picture has come.
+  // One change is on its way to the kernel at a time: the next leaves when its picture has come. `wanted`
+  // holds the handles that have moved since, so that what the kernel has set for the others stays.
   let waiting = false;
   let wanted = null;
   let patience = null;
 
-  function send(points) {
-    wanted = points;
-    if (waiting) return;
+  const points = () => ({ ...model.get("points"), ...wanted });
+
+  function send() {
+    if (waiting || !wanted) return;
     waiting = true;
-    patience = setTimeout(arrived, 1000);
-    model.set("points", wanted);
+    patience = setTimeout(arrived, PATIENCE);
+    model.set("points", points());
     wanted = null;
     model.save_changes();
   }
@@ -31,23 +48,30 @@ function render({ model, el }) {
   function arrived() {
     clearTimeout(patience);
     waiting = false;
-    if (wanted) send(wanted);
+    send();
   }
 
-  function clamp([x, y]) {
-    const [left, right, low, high] = model.get("_limits");
+  function clamp(name, [x, y]) {
+    const [left, right, low, high] = model.get("_bounds")[name] ?? model.get("_limits");
     return [Math.min(right, Math.max(left, x)), Math.min(high, Math.max(low, y))];
   }
 
   function move(name, place) {
-    const points = { ...(wanted ?? model.get("points")), [name]: clamp(place) };
-    send(points);
-    draw(points);
+    const before = points();
+    const now = { [name]: clamp(name, place) };
+    const [dx, dy] = [0, 1].map((i) => now[name][i] - before[name][i]);
+    for (const [carried, carrier] of Object.entries(model.get("_carriers"))) {
+      const [x, y] = before[carried];
+      if (carrier === name) now[carried] = clamp(carried, [x + dx, y + dy]);
+    }
+    wanted = { ...wanted, ...now };
+    send();
+    draw();
   }
 
   function toData(event) {
     const [x0, y0, x1, y1] = model.get("_frame");
-    const box = handles.getBoundingClientRect();
+    const box = overlay.getBoundingClientRect();
     const scale = model.get("_size")[0] / box.width;
     const px = (event.clientX - box.left) * scale;
     const py = (event.clientY - box.top) * scale;
@@ -55,20 +79,23 @@ function render({ model, el }) {
   }
 
   function circle(name) {
-    const handle = document.createElementNS(SVG, "circle");
-    handle.setAttribute("r", 9);
-    handle.setAttribute("tabindex", 0);
-    handle.setAttribute("role", "slider");
-    handle.setAttribute("aria-label", name);
+    const attributes = { r: 9, tabindex: 0, role: "slider", "aria-label": name };
+    const style = "cursor:grab;stroke:white;stroke-width:2;fill-opacity:0.75;pointer-events:auto;touch-action:none";
+    const handle = shape("circle", attributes, style, overlay);
+    shape("title", {}, "", handle).textContent = name;
     handle.dataset.name = name;
-    handle.style.cssText = "cursor:grab;stroke:white;stroke-width:2;fill-opacity:0.75";
+    let grip = [0, 0];
     handle.addEventListener("pointerdown", (event) => {
+      const [x, y] = toData(event);
+      grip = [points()[name][0] - x, points()[name][1] - y];
       handle.setPointerCapture(event.pointerId);
       event.preventDefault();
       handle.focus();
     });
     handle.addEventListener("pointermove", (event) => {
-      if (handle.hasPointerCapture(event.pointerId)) move(name, toData(event));
+      if (!handle.hasPointerCapture(event.pointerId)) return;
+      const [x, y] = toData(event);
+      move(name, [x + grip[0], y + grip[1]]);
     });
     handle.addEventListener("keydown", (event) => {
       const step = KEYS[event.key];
@@ -77,26 +104,32 @@ function render({ model, el }) {
       event.stopPropagation();
       const [left, right, low, high] = model.get("_limits");
       const share = event.shiftKey ? 0.1 : 0.02;
-      const [x, y] = (wanted ?? model.get("points"))[name];
+      const [x, y] = points()[name];
       move(name, [x + share * step[0] * (right - left), y + share * step[1] * (high - low)]);
     });
-    handles.append(handle);
     return handle;
   }
 
-  const circles = {};
-
-  function draw(points) {
+  function draw() {
     const [x0, y0, x1, y1] = model.get("_frame");
     const [width, height] = model.get("_size");
+    const pixels = ([x, y]) => [x0 + x * (x1 - x0), y0 + y * (y1 - y0)];
+    const now = points();
     board.style.width = `${width}px`;
-    handles.setAttribute("viewBox", `0 0 ${width} ${height}`);
-    for (const [name, [x, y]] of Object.entries(points)) {
+    overlay.setAttribute("viewBox", `0 0 ${width} ${height}`);
+    for (const [name, place] of Object.entries(now)) {
       const handle = (circles[name] ??= circle(name));
-      handle.setAttribute("cx", x0 + x * (x1 - x0));
-      handle.setAttribute("cy", y0 + y * (y1 - y0));
+      const [x, y] = pixels(place);
+      handle.setAttribute("cx", x);
+      handle.setAttribute("cy", y);
       handle.setAttribute("fill", model.get("_colours")[name]);
-      handle.setAttribute("aria-valuetext", `${x.toFixed(3)}, ${y.toFixed(3)}`);
+      handle.setAttribute("aria-valuetext", `${place[0].toFixed(3)}, ${place[1].toFixed(3)}`);
+    }
+    for (const [name, carrier] of Object.entries(model.get("_carriers"))) {
+      const line = (lines[name] ??= shape("line", { "stroke-width": 2.5 }, "", arrows));
+      const [a, b] = [pixels(now[carrier]), pixels(now[name])];
+      const ends = { x1: a[0], y1: a[1], x2: b[0], y2: b[1], stroke: model.get("_colours")[name] };
+      for (const [key, value] of Object.entries(ends)) line.setAttribute(key, value);
     }
   }
 
@@ -104,12 +137,17 @@ function render({ model, el }) {
     picture.src = model.get("_image");
     picture.alt = model.get("_description");
     arrived();
-    draw(wanted ?? model.get("points"));
+    draw();
   }
 
   model.on("change:_image", show);
-  model.on("change:points", () => draw(wanted ?? model.get("points")));
+  model.on("change:points", draw);
   show();
+  return () => {
+    clearTimeout(patience);
+    model.off("change:_image", show);
+    model.off("change:points", draw);
+  };
 }
 
 export default { render };
