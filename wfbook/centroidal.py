@@ -86,8 +86,22 @@ def linear_dynamics(a: Any, lam: Any, f: Any, mass: float) -> list[Any]:
     Returns:
         Three residuals of shape ``(K,)``: accelerations.
     """
+    return [a_i - free_i for a_i, free_i in zip(a, acceleration(lam, f, mass), strict=True)]
+
+
+def acceleration(lam: Any, f: Any, mass: float) -> list[Any]:
+    """Return how forces accelerate the centre of mass (Paper A, eq. 1).
+
+    Args:
+        lam: contact forces on the robot, components of shape ``(K, L)``.
+        f: rolling friction on the robot, components of shape ``(K, L)``.
+        mass: of the robot.
+
+    Returns:
+        Components of shape ``(K,)``.
+    """
     gravity = (0.0, 0.0, -GRAVITY)
-    return [a[i] - gravity[i] - (lam[i].sum(axis=1) + f[i].sum(axis=1)) / mass for i in range(3)]
+    return [(lam[i].sum(axis=1) + f[i].sum(axis=1)) / mass + gravity[i] for i in range(3)]
 
 
 def midpoint_integration(x: Any, v: Any, a: Any, dt: float) -> list[Any]:
@@ -144,6 +158,132 @@ def bound_terms(lever: Any, lam: Any, scale: float = 1.0) -> tuple[list[Any], li
     plus = [(r[j] + w[k], r[k] - w[j]) for _, j, k in _CYCLIC]
     minus = [(r[j] - w[k], r[k] + w[j]) for _, j, k in _CYCLIC]
     return plus, minus
+
+
+def least_bounds(lever: Any, lam: Any, scale: float = 1.0) -> tuple[list[Any], list[Any]]:
+    """Return the least U⁺ and U⁻ that eq. 9 allows: the squares themselves (Paper A, eq. 9).
+
+    Args:
+        lever: ``p − x``, components of shape ``(K, L)``.
+        lam: contact forces, components of shape ``(K, L)``.
+        scale: as for :func:`bound_terms`.
+
+    Returns:
+        Components of U⁺ and of U⁻, of shape ``(K, L)``; ``(U⁺ − U⁻)/4`` is the torque of eq. 8.
+    """
+    plus, minus = ([a**2 + b**2 for a, b in side] for side in bound_terms(lever, lam, scale))
+    return plus, minus
+
+
+@dataclass(frozen=True)
+class RollOut:
+    """How a body moves that is pushed.
+
+    Attributes:
+        t: ``(K+1,)`` time.
+        x: ``(K+1, 3)`` centre of mass.
+        v: ``(K+1, 3)`` its velocity.
+        momentum: ``(K+1, 3)`` angular momentum about the centre of mass.
+        a: ``(K, 3)`` acceleration of the centre of mass.
+        torque: ``(K, 3)`` of all contacts about the centre of mass.
+    """
+
+    t: np.ndarray
+    x: np.ndarray
+    v: np.ndarray
+    momentum: np.ndarray
+    a: np.ndarray
+    torque: np.ndarray
+
+    def angles(self, inertia: np.ndarray) -> np.ndarray:
+        """Return roll, pitch and yaw from level, as a rigid body of this inertia turns, ``(K+1, 3)``.
+
+        For small angles, which are all that eq. 8 knows: ``I θ̈ = torque``.
+        """
+        rate = np.linalg.solve(inertia, self.momentum.T).T
+        return _sum_up(np.zeros(3), 0.5 * (self.t[1] - self.t[0]) * (rate[:-1] + rate[1:]))
+
+
+def roll_out(
+    mass: float,
+    dt: float,
+    p: np.ndarray,
+    lam: np.ndarray,
+    x: np.ndarray,
+    v: np.ndarray | None = None,
+    momentum: np.ndarray | None = None,
+) -> RollOut:
+    """Follow eqs 1 and 8 forward in time by the paper's midpoint rule (Paper A, eqs 1 and 8).
+
+    The rule is that of :func:`midpoint_integration`, solved for what comes next; levers are taken at the
+    middle of each interval, as the planner takes them.
+
+    Args:
+        mass: of the body.
+        dt: time between knots.
+        p: ``(K+1, L, 3)`` contact points.
+        lam: ``(K, L, 3)`` forces on the body, rolling friction included.
+        x: ``(3,)`` centre of mass at the first knot, or ``(K+1, 3)``, at all of them: where it was measured.
+        v: ``(3,)`` its velocity at the first knot; at rest without one.
+        momentum: ``(3,)`` angular momentum at the first knot; none without one.
+
+    Returns:
+        The motion; ``x`` is the integrated one, also where it was given at all knots.
+    """
+    force = np.moveaxis(lam, -1, 0)
+    a = np.stack(acceleration(force, np.zeros_like(force), mass), axis=-1)
+    velocity = _sum_up(np.zeros(3) if v is None else v, dt * a)
+    known = np.atleast_2d(x)
+    path = _sum_up(known[0], 0.5 * dt * (velocity[:-1] + velocity[1:]))
+    lever = p - (path if len(known) == 1 else known)[:, None]
+    middle = np.moveaxis(0.5 * (lever[:-1] + lever[1:]), -1, 0)
+    torque = np.stack([turning.sum(axis=1) for turning in contact_torque(middle, force)], axis=-1)
+    spin = _sum_up(np.zeros(3) if momentum is None else momentum, dt * torque)
+    return RollOut(dt * np.arange(len(path)), path, velocity, spin, a, torque)
+
+
+def _sum_up(start: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    return np.vstack([start, start + np.cumsum(steps, axis=0)])
+
+
+def carried(p: np.ndarray, x: np.ndarray, weight: float) -> np.ndarray:
+    """Return the vertical pushes that carry a weight and turn the robot least.
+
+    Legs can't pull. While the centre of mass is over the polygon of the contacts there are pushes that do not
+    turn the robot at all; beyond, the best ones act where the polygon is nearest.
+
+    Args:
+        p: ``(L, 3)`` contact points of the standing legs.
+        x: ``(3,)`` centre of mass.
+        weight: to be carried.
+
+    Returns:
+        ``(L,)``, none negative; where several do, the most even ones.
+    """
+    from scipy.optimize import nnls
+
+    # Carrying the weight comes first, then not to turn; evenness decides between what is left.
+    arms = p[:, :2] - np.asarray(x)[:2]
+    rows = np.vstack([1e3 * np.ones(len(p)), arms.T, 1e-5 * np.eye(len(p))])
+    shares, _ = nnls(rows, np.concatenate([[1e3, 0.0, 0.0], np.zeros(len(p))]))
+    return weight * shares
+
+
+def cheapest_claim(real: float, wanted: float, charge: float, value: float = 1.0) -> float:
+    """Return the torque that a program claims which must pay for U± (Paper A, eq. 9).
+
+    It minimises ``charge (e⁺ + e⁻) + value (wanted − claimed)²/2`` over what it adds to the squares,
+    ``e⁺, e⁻ ≥ 0``, with ``claimed = real + (e⁺ − e⁻)/4``. A newton metre made of nothing costs ``4 charge``; so
+    nothing is added until a real one is worth more than that.
+
+    Args:
+        real: torque of the contacts.
+        wanted: torque that would be best.
+        charge: for a unit of U⁺ or U⁻.
+        value: of coming closer to the wanted torque.
+    """
+    missing = wanted - real
+    return real + float(np.sign(missing)) * max(abs(missing) - 4.0 * charge / value, 0.0)
 
 
 _CYCLIC = ((0, 1, 2), (1, 2, 0), (2, 0, 1))

@@ -242,6 +242,30 @@ class Go1:
         return any(max(leg_of[a], leg_of[b]) < 0 for a, b in self.data.contact.geom.tolist())
 
 
+def momenta(qpos: np.ndarray, qvel: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the momentum of all bodies together, as MuJoCo adds it up.
+
+    Args:
+        qpos: ``(N, 23)`` configurations.
+        qvel: ``(N, 22)`` velocities.
+
+    Returns:
+        ``(N, 3)`` linear momentum, and ``(N, 3)`` angular momentum about the centre of mass, world frame.
+    """
+    model = mujoco.MjModel.from_xml_path(str(ASSETS / "go1.xml"))
+    data = mujoco.MjData(model)
+    trunk = model.body("trunk").id
+    linear, angular = np.empty((len(qpos), 3)), np.empty((len(qpos), 3))
+    for k, (data.qpos, data.qvel) in enumerate(zip(qpos, qvel, strict=True)):
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_comVel(model, data)
+        mujoco.mj_subtreeVel(model, data)
+        linear[k] = model.body_subtreemass[trunk] * data.subtree_linvel[trunk]
+        angular[k] = data.subtree_angmom[trunk]
+    return linear, angular
+
+
 def convex_bodies(terrain: "Terrain") -> list[list[int]]:
     """Return the indices of the regions that make one convex body each, so that it has no seams.
 

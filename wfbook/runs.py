@@ -5,8 +5,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from wfbook import archive
+from wfbook.centroidal import Robot, RollOut, roll_out
+from wfbook.go1 import momenta
 from wfbook.go1_dynamics import GRAVITY
 from wfbook.modes import END_EFFECTORS, LEGS
 from wfbook.terrain import Terrain
@@ -126,6 +129,38 @@ class Run:
         data["metrics"] = dict.fromkeys(TIMINGS) | data["metrics"]
         data["terrain"] = Terrain.from_dict(data["terrain"], source=f"{path}: terrain")
         return cls(**data)
+
+
+@dataclass(frozen=True)
+class Momentum:
+    """What a run's contact forces should have done to the robot, and what they did.
+
+    Attributes:
+        predicted: eqs 1 and 8 with the measured forces, contacts and path, from the first sample on.
+        velocity: ``(N, 3)`` of the centre of mass, as MuJoCo has it.
+        angular: ``(N, 3)`` angular momentum of all bodies about the centre of mass, as MuJoCo has it.
+        trunk: ``(N, 3)`` what a rigid robot with the trunk's rate would have: the left side of eq. 8.
+    """
+
+    predicted: RollOut
+    velocity: np.ndarray
+    angular: np.ndarray
+    trunk: np.ndarray
+
+
+def momentum_of(run: Run) -> Momentum:
+    """Check Newton's and Euler's laws on a run (Paper A, eqs 1 and 8).
+
+    A run keeps the force of every second millisecond of the simulation; between two samples, their mean acts.
+    """
+    robot = Robot.go1()
+    linear, angular = momenta(run.qpos, run.qvel)
+    velocity = linear / robot.mass
+    force = 0.5 * (run.contact_force[:-1] + run.contact_force[1:])
+    dt = float(run.t[-1] - run.t[0]) / (len(run.t) - 1)
+    predicted = roll_out(robot.mass, dt, run.p, force, run.com, velocity[0], angular[0])
+    trunk = Rotation.from_quat(run.qpos[:, [4, 5, 6, 3]])
+    return Momentum(predicted, velocity, angular, trunk.apply(run.qvel[:, 3:6] @ robot.inertia.T))
 
 
 def metrics_of(

@@ -5,7 +5,7 @@ from typing import Any
 import cvxpy as cp
 import numpy as np
 
-from wfbook.centroidal import Robot, bound_terms
+from wfbook.centroidal import Robot, least_bounds
 from wfbook.modes import END_EFFECTORS, LEGS, contact_centroid, dynamics_matrix
 from wfbook.planner.conic import Conic
 from wfbook.planner.gait import Gait
@@ -49,7 +49,7 @@ def plan_of(problem: Problem, values: dict[str, Any], gait: Gait, meta: dict[str
     force, friction = ([np.asarray(c, float) for c in values[name]] for name in ("force", "friction"))
     lever = [world["p"][..., i] - world["x"][:, i, None] for i in range(3)]
     middle = [0.5 * (r[1:] + r[:-1]) for r in lever]
-    sides = [[a**2 + b**2 for a, b in terms] for terms in bound_terms(middle, force)]
+    sides = least_bounds(middle, force)
     if "U_plus" in values:
         # The program knows only the sum over legs: what exceeds the squares is shared evenly.
         for squares, total in zip(sides, (values["U_plus"], values["U_minus"]), strict=True):

@@ -155,7 +155,7 @@ def common(
     middle = program.lever = [0.5 * (r[1:] + r[:-1]) for r in levers(program)]
     for side, terms in zip(bounds, bound_terms(middle, force), strict=True):
         for u, pair in zip(side, terms, strict=True):
-            program.add("torque bounds", *_above_squares(u, pair, per_leg))
+            program.add("torque bounds", *above_squares(u, pair, per_leg))
 
     bound(program, problem)
     program.cost = motion_cost(program) + problem.weights.bounds * sum(
@@ -225,7 +225,7 @@ def _vectors(K: int) -> list[tuple[str, int]]:
     return [("x", K + 1), ("v", K + 1), ("a", K), ("theta", K + 1), ("omega", K + 1), ("alpha", K)]
 
 
-def _above_squares(u: Any, pair: tuple[Any, Any], per_leg: bool) -> list[Any]:
+def above_squares(u: Any, pair: tuple[Any, Any], per_leg: bool) -> list[Any]:
     """State ``u ≥ Σ pair²`` as second-order cones (eq. 9): ``‖(2 z, u − 1)‖ ≤ u + 1``."""
     if per_leg:
         flat = [cp.vec(z, order="C") for z in (2 * pair[0], 2 * pair[1], u - 1)]
