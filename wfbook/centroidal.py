@@ -273,8 +273,8 @@ def cheapest_claim(real: float, wanted: float, charge: float, value: float = 1.0
     """Return the torque that a program claims which must pay for U± (Paper A, eq. 9).
 
     It minimises ``charge (e⁺ + e⁻) + value (wanted − claimed)²/2`` over what it adds to the squares,
-    ``e⁺, e⁻ ≥ 0``, with ``claimed = real + (e⁺ − e⁻)/4``. A newton metre made of nothing costs ``4 charge``; so
-    nothing is added until a real one is worth more than that.
+    ``e⁺, e⁻ ≥ 0``, with ``claimed = real + (e⁺ − e⁻)/4``. A newton metre made of nothing costs
+    ``4 charge``; so nothing is added until a real one is worth more than that.
 
     Args:
         real: torque of the contacts.

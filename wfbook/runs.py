@@ -136,12 +136,14 @@ class Momentum:
     """What a run's contact forces should have done to the robot, and what they did.
 
     Attributes:
+        t: ``(N,)`` time, from the plan's start on.
         predicted: eqs 1 and 8 with the measured forces, contacts and path, from the first sample on.
         velocity: ``(N, 3)`` of the centre of mass, as MuJoCo has it.
         angular: ``(N, 3)`` angular momentum of all bodies about the centre of mass, as MuJoCo has it.
         trunk: ``(N, 3)`` what a rigid robot with the trunk's rate would have: the left side of eq. 8.
     """
 
+    t: np.ndarray
     predicted: RollOut
     velocity: np.ndarray
     angular: np.ndarray
@@ -153,14 +155,16 @@ def momentum_of(run: Run) -> Momentum:
 
     A run keeps the force of every second millisecond of the simulation; between two samples, their mean acts.
     """
-    robot = Robot.go1()
-    linear, angular = momenta(run.qpos, run.qvel)
+    robot, going = Robot.go1(), run.t >= 0.0
+    t, qpos, qvel = run.t[going], run.qpos[going], run.qvel[going]
+    linear, angular = momenta(qpos, qvel)
     velocity = linear / robot.mass
-    force = 0.5 * (run.contact_force[:-1] + run.contact_force[1:])
-    dt = float(run.t[-1] - run.t[0]) / (len(run.t) - 1)
-    predicted = roll_out(robot.mass, dt, run.p, force, run.com, velocity[0], angular[0])
-    trunk = Rotation.from_quat(run.qpos[:, [4, 5, 6, 3]])
-    return Momentum(predicted, velocity, angular, trunk.apply(run.qvel[:, 3:6] @ robot.inertia.T))
+    force = run.contact_force[going]
+    force = 0.5 * (force[:-1] + force[1:])
+    dt = float(t[-1] - t[0]) / (len(t) - 1)
+    predicted = roll_out(robot.mass, dt, run.p[going], force, run.com[going], velocity[0], angular[0])
+    trunk = Rotation.from_quat(qpos[:, [4, 5, 6, 3]])
+    return Momentum(t, predicted, velocity, angular, trunk.apply(qvel[:, 3:6] @ robot.inertia.T))
 
 
 def metrics_of(

@@ -1,8 +1,8 @@
 """The planner's convex program at a single instant: small enough to see when eq. 9 is tight.
 
 A robot stands on some of its legs and is to accelerate without turning. The program chooses where its centre
-of mass is and how the legs push, at the planner's own cost and with the planner's own bounds on the torque. It has
-no binaries and no time, so it is solved in milliseconds, and the true, non-convex problem beside it.
+of mass is and how the legs push, at the planner's own cost and with its own bounds on the torque. It
+has no binaries and no time, so it is solved in milliseconds, and the true, non-convex problem beside it.
 """
 
 from collections.abc import Sequence
@@ -107,7 +107,7 @@ class Instant:
         Args:
             a: ``(3,)`` demanded acceleration of the centre of mass.
             charge: weight of U⁺ + U⁻; default the planner's.
-            pull: ``(2,)`` where the cost would have the centre of mass, relative to the standing legs' middle.
+            pull: ``(2,)`` where the cost would have the centre of mass, from the standing legs' middle.
 
         Raises:
             ValueError: nothing accelerates the robot like that.
@@ -158,7 +158,9 @@ class Instant:
             _, lever, force = parts(y)
             demanded = [np.array([a_i]) for a_i in a]
             newton = linear_dynamics(demanded, force, [np.zeros((1, L))] * 3, 1.0 / GRAVITY)
-            return np.array([*(r[0] / GRAVITY for r in newton), *(t.sum() for t in contact_torque(lever, force))])
+            return np.array(
+                [*(r[0] / GRAVITY for r in newton), *(t.sum() for t in contact_torque(lever, force))]
+            )
 
         first = np.concatenate([start.offset, start.lam.T.ravel() / self.robot.weight])
         limits = [*zip(-reach, reach, strict=True), *[(None, None)] * 2 * L, *[(0.0, None)] * L]
@@ -182,7 +184,12 @@ class Instant:
         )
 
     def _stance(
-        self, offset: np.ndarray, force: np.ndarray, claimed: np.ndarray, price: np.ndarray | None, cost: float
+        self,
+        offset: np.ndarray,
+        force: np.ndarray,
+        claimed: np.ndarray,
+        price: np.ndarray | None,
+        cost: float,
     ) -> Stance:
         """Turn the program's units into newtons."""
         weight = self.robot.weight

@@ -90,7 +90,7 @@ class Board(anywidget.AnyWidget):
         return [float(min(max(x, left), right)), float(min(max(y, low), high))]
 
     def move(self, name: str, x: float, y: float) -> None:
-        """Move one handle to ``(x, y)`` and those that it carries with it, as a reader does with the mouse."""
+        """Move one handle to ``(x, y)`` and those that it carries, as a reader does with the mouse."""
         place = self._within(name, x, y)
         step = np.subtract(place, self.points[name])
         along = {
