@@ -7,9 +7,13 @@ from wfbook.centroidal import (
     GRAVITY,
     Robot,
     bound_terms,
+    carried,
+    cheapest_claim,
     contact_torque,
+    least_bounds,
     linear_dynamics,
     midpoint_integration,
+    roll_out,
 )
 
 RNG = np.random.default_rng(3)
@@ -58,3 +62,64 @@ def test_the_go1_is_left_right_symmetric_and_its_reach_holds_its_stance():
     nominal = np.column_stack([robot.stance, np.full(4, -robot.height)])
     assert (robot.reach_lower < nominal).all() and (nominal < robot.reach_upper).all()
     assert np.linalg.eigvalsh(robot.inertia).min() > 0
+
+
+def test_rolling_out_is_the_midpoint_rule_solved_for_what_comes_next():
+    K, L, dt = 7, 4, 0.1
+    p, lam = RNG.normal(size=(K + 1, L, 3)), 30.0 * RNG.normal(size=(K, L, 3))
+    motion = roll_out(13.0, dt, p, lam, x=np.array([0.1, 0.0, 0.3]), v=np.array([0.2, 0.0, -0.1]))
+    residuals = midpoint_integration(motion.x.T, motion.v.T, motion.a.T, dt)
+    np.testing.assert_allclose(np.concatenate(residuals), 0.0, atol=1e-12)
+    still = [np.zeros((K, L))] * 3
+    np.testing.assert_allclose(
+        linear_dynamics(motion.a.T, np.moveaxis(lam, -1, 0), still, 13.0), 0.0, atol=1e-12
+    )
+    # Angular momentum about the origin changes by all forces' and the weight's torque about the origin.
+    about_origin = motion.momentum + 13.0 * np.cross(motion.x, motion.v)
+    middle = 0.5 * (p[1:] + p[:-1])
+    arms = 0.5 * (motion.x[1:] + motion.x[:-1])
+    torque = np.cross(middle, lam).sum(axis=1) + np.cross(arms, [0.0, 0.0, -13.0 * GRAVITY])
+    np.testing.assert_allclose(np.diff(about_origin, axis=0), dt * torque, atol=1e-9)
+
+
+def test_a_body_turns_by_half_of_what_its_last_rate_would():
+    inertia, knots = np.diag([0.2, 0.4, 0.5]), 10
+    p = np.tile([0.0, 0.0, 0.0], (knots + 1, 1, 1))
+    lam = np.tile([5.0, 0.0, 0.0], (knots, 1, 1))
+    motion = roll_out(13.0, 0.02, p, lam, x=np.tile([0.0, 0.0, 0.3], (knots + 1, 1)))
+    torque = -0.3 * 5.0
+    np.testing.assert_allclose(motion.torque, [[0.0, torque, 0.0]] * knots, atol=1e-12)
+    assert motion.angles(inertia)[-1] == pytest.approx([0.0, 0.5 * torque / 0.4 * 0.2**2, 0.0])
+
+
+@pytest.mark.parametrize("scale", [0.5, 1.0, 3.0])
+def test_the_least_bounds_differ_by_the_torque_and_are_squares(scale):
+    lever, lam = RNG.normal(size=(2, 3, 6, 4))
+    up, down = least_bounds(lever, lam, scale)
+    for torque, high, low in zip(contact_torque(lever, lam), up, down, strict=True):
+        np.testing.assert_allclose((high - low) / 4, torque, atol=1e-10)
+        assert (high >= 0.0).all() and (low >= 0.0).all()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_what_legs_carry_turns_the_robot_least(seed):
+    rng = np.random.default_rng(seed)
+    p, x = np.column_stack([rng.normal(size=(4, 2)), np.zeros(4)]), np.array([*rng.normal(size=2), 0.3])
+    best = carried(p, x, 100.0)
+    assert best.sum() == pytest.approx(100.0) and best.min() >= 0.0
+
+    def left(loads):
+        return np.linalg.norm(loads @ (p - x)[:, :2])
+
+    for loads in 100.0 * rng.dirichlet(np.ones(4), 200):
+        assert left(best) <= left(loads) + 1e-3
+
+
+@pytest.mark.parametrize(("real", "wanted"), [(6.0, 12.0), (6.0, -3.0), (-2.0, -2.1)])
+@pytest.mark.parametrize("charge", [0.0, 0.3, 2.0])
+def test_the_cheapest_claim_is_the_cheapest(real, wanted, charge):
+    def cost(claimed):
+        return 4 * charge * abs(claimed - real) + 2.0 * (wanted - claimed) ** 2 / 2
+
+    best = cheapest_claim(real, wanted, charge, value=2.0)
+    assert all(cost(best) <= cost(other) + 1e-9 for other in np.linspace(-20.0, 20.0, 801))

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import traitlets
 
-from wfbook.view.style import Picture
+from wfbook.view.style import INK, Picture
 from wfbook.view.widgets.board import Board
 from wfbook.view.widgets.panel import Panel, image, table
 
@@ -119,3 +119,10 @@ def test_the_layout_does_not_change_under_the_hand():
     assert board._frame == frame and board._image != image
     board.show(Picture(3, 2), Picture(3, 2).subplots(), "another kind of picture")
     assert board._frame != frame
+
+
+def test_handles_can_be_painted_anew(board):
+    board.paint(foot="#E4E4E4")
+    assert board._colours == {"foot": "#E4E4E4", "hip": INK}
+    with pytest.raises(ValueError, match="no handle 'knee'"):
+        board.paint(knee="#E4E4E4")

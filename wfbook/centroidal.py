@@ -266,7 +266,7 @@ def carried(p: np.ndarray, x: np.ndarray, weight: float) -> np.ndarray:
     arms = p[:, :2] - np.asarray(x)[:2]
     rows = np.vstack([1e3 * np.ones(len(p)), arms.T, 1e-5 * np.eye(len(p))])
     shares, _ = nnls(rows, np.concatenate([[1e3, 0.0, 0.0], np.zeros(len(p))]))
-    return weight * shares
+    return weight * shares / shares.sum()
 
 
 def cheapest_claim(real: float, wanted: float, charge: float, value: float = 1.0) -> float:

@@ -13,8 +13,8 @@ from wfbook.modes import LEGS
 from wfbook.runs import Momentum
 from wfbook.view.style import BODY, FOOT, FORCE, INK, MEASURED, PALE, PLANNED, Picture, tidy
 
-METRES_A_NEWTON = 0.0016
-"""Length of a force's arrow: the robot's weight is 0.2 m."""
+METRES_A_NEWTON = 0.0024
+"""Length of a force's arrow: the robot's weight is 0.3 m."""
 
 _TRUNK = np.array([[-0.19, -0.05], [0.19, -0.05], [0.19, 0.05], [-0.19, 0.05]])
 _HIPS = np.array([[0.188, 0.0], [-0.188, 0.0]])

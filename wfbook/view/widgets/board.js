@@ -2,6 +2,8 @@
 const SVG = "http://www.w3.org/2000/svg";
 const KEYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const PATIENCE = 2000;
+const HANDLE =
+  "cursor:grab;stroke:white;stroke-width:2;fill-opacity:0.75;outline:none;pointer-events:auto;touch-action:none";
 
 function shape(kind, attributes, style, parent) {
   const element = document.createElementNS(SVG, kind);
@@ -80,8 +82,10 @@ function render({ model, el }) {
 
   function circle(name) {
     const attributes = { r: 9, tabindex: 0, role: "slider", "aria-label": name };
-    const style = "cursor:grab;stroke:white;stroke-width:2;fill-opacity:0.75;pointer-events:auto;touch-action:none";
-    const handle = shape("circle", attributes, style, overlay);
+    const handle = shape("circle", attributes, HANDLE, overlay);
+    const ring = (colour) => handle.style.setProperty("stroke", colour);
+    handle.addEventListener("focus", () => ring("#222222"));
+    handle.addEventListener("blur", () => ring("white"));
     shape("title", {}, "", handle).textContent = name;
     handle.dataset.name = name;
     let grip = [0, 0];
@@ -142,11 +146,13 @@ function render({ model, el }) {
 
   model.on("change:_image", show);
   model.on("change:points", draw);
+  model.on("change:_colours", draw);
   show();
   return () => {
     clearTimeout(patience);
     model.off("change:_image", show);
     model.off("change:points", draw);
+    model.off("change:_colours", draw);
   };
 }
 

@@ -100,6 +100,12 @@ class Board(anywidget.AnyWidget):
         }
         self.points = {**self.points, name: place, **along}
 
+    def paint(self, **colours: str) -> None:
+        """Give handles other colours, by name; with spaces in it, ``paint(**{"front foot": SWING})``."""
+        for name in set(colours) - set(self.points):
+            raise ValueError(f"points: there is no handle {name!r}, only {sorted(self.points)}")
+        self._colours = {**self._colours, **colours}
+
     def show(self, picture: Picture, axes: Axes, description: str) -> None:
         """Put a picture behind the handles.
 
@@ -114,7 +120,7 @@ class Board(anywidget.AnyWidget):
         """
         kind = (len(picture.axes), *picture.get_size_inches())
         if self._layout is not None and self._layout[0] == kind:
-            picture.set_layout_engine("none")
+            picture.set_layout_engine(None)  # "none" keeps a placeholder, for which matplotlib draws twice
             for each, place in zip(picture.axes, self._layout[1], strict=True):
                 each.set_position(place)
         data = base64.b64encode(picture.png()).decode("ascii")  # drawing it settles the layout

@@ -11,7 +11,7 @@ from wfbook.modes import LEGS
 from wfbook.planner.instant import Instant, Stance
 from wfbook.planner.problem import Weights
 from wfbook.view.drawings.centroidal import METRES_A_NEWTON, arrow, side_view, support
-from wfbook.view.style import FOOT, FORCE, INK, MEASURED, PALE, PLANNED, Picture, tidy
+from wfbook.view.style import FOOT, FORCE, INK, MEASURED, PALE, PLANNED, SWING, Picture, tidy
 from wfbook.view.widgets.board import Board
 from wfbook.view.widgets.panel import Panel
 
@@ -30,6 +30,7 @@ class ForcesAndFeet(Panel):
 
     Attributes:
         example: forces to begin with; set its ``value`` to a name in :attr:`EXAMPLES`.
+        again: a button that puts all handles back to where the example has them.
         board: handles ``front foot``, ``rear foot``, ``front force`` and ``rear force``.
         motion: what the forces do: a :class:`~wfbook.centroidal.RollOut`.
     """
@@ -48,34 +49,34 @@ class ForcesAndFeet(Panel):
         self.motion: RollOut | None = None
         front, rear = self.robot.stance[0, 0], self.robot.stance[2, 0]
         reach = self.robot.reach[0]
-        feet = {"front foot": (front, 0.0), "rear foot": (rear, 0.0)}
+        self._feet = feet = {"front foot": (front, 0.0), "rear foot": (rear, 0.0)}
         limits = {name: (x - reach, x + reach, 0.0, 0.0) for name, (x, _) in feet.items()}
         tips = {name.replace("foot", "force"): name for name in feet}
         self.board = Board(
-            feet | self._tips("stand", feet),
+            feet | self._tips("stand"),
             dict.fromkeys(feet, FOOT) | dict.fromkeys(tips, FORCE),
             limits | dict.fromkeys(tips, (-1.0, 1.0, 0.0, 1.0)),
             tips,
         )
         self.example = ipywidgets.Dropdown(options=list(self.EXAMPLES), description="begin with", style=_WIDE)
-        super().__init__([self.example], [])
+        self.again = ipywidgets.Button(description="again")
+        self.again.on_click(self._begin)
+        super().__init__([self.example, self.again], [])
         self.children = (*self.children, self.board)
         self.example.observe(self._begin, names="value")
         self.board.observe(self._follow, names="points")
 
-    def _tips(self, example: str, feet: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
+    def _tips(self, example: str) -> dict[str, tuple[float, float]]:
         """Return where the arrows of an example end."""
         length = METRES_A_NEWTON * self.robot.weight
         return {
             name.replace("foot", "force"): (x + length * along, z + length * up)
-            for (name, (x, z)), (along, up) in zip(feet.items(), self.EXAMPLES[example], strict=True)
+            for (name, (x, z)), (along, up) in zip(self._feet.items(), self.EXAMPLES[example], strict=True)
         }
 
     def _begin(self, _change: object = None) -> None:
-        feet = {name: self.board.points[name] for name in ("front foot", "rear foot")}
-        self.board.points = {
-            name: list(place) for name, place in (feet | self._tips(self.example.value, feet)).items()
-        }
+        start = self._feet | self._tips(self.example.value)
+        self.board.points = {name: list(place) for name, place in start.items()}
 
     def forces(self) -> np.ndarray:
         """Return the forces on front and rear pair, ``(2, 2)``: x and z in newtons."""
@@ -111,11 +112,16 @@ class ForcesAndFeet(Panel):
         for axes in (speed, spin):
             tidy(axes)
             axes.axhline(0.0, color=PALE, linewidth=1.0)
-        a, torque = motion.a[0], motion.torque[0, 1]
+        a, torque, turned = motion.a[0], motion.torque[0, 1], abs(np.rad2deg(pitch[-1]))
+        if turned < 0.5:
+            end = "as level as before"
+        else:
+            # Eq. 8 with small angles is no longer true where the robot turns over.
+            end = (f"{turned:.0f}°" if turned < 90.0 else "head over heels,") + f" nose {_nose(pitch[-1])}"
         self.say(
-            f"acceleration {a[0]:+.2f} m/s² ahead, {a[2]:+.2f} m/s² up; torque {torque:+.2f} N m at first"
-            f" (nose {'down' if torque > 0 else 'up'}); after {SLOT} s: {motion.v[-1, 0]:+.2f} m/s ahead,"
-            f" nose {np.rad2deg(pitch[-1]):+.1f}° down"
+            f"acceleration {a[0]:+.2f} m/s² ahead, {a[2]:+.2f} m/s² up; torque {abs(torque):.2f} N m"
+            f"{f' nose {_nose(torque)}' if abs(torque) >= 0.005 else ''};"
+            f" after {SLOT} s {motion.v[-1, 0]:+.2f} m/s ahead and {end}"
         )
         self.board.show(
             picture, view, "a robot from its right, forces on its feet, its path and where it turns"
@@ -177,20 +183,23 @@ class WhereToStand(Panel):
             if np.linalg.norm(x[:2] - pressure) > 2e-3:
                 arrow(view, pressure, x[:2] - pressure, "tips", INK)
         view.set(xlim=(-0.46, 0.46), ylim=(-0.32, 0.32))
+        self.board.paint(**{leg: FOOT if on else SWING for leg, on in zip(LEGS, stands, strict=True)})
         tidy(bars)
         bars.bar(["roll", "pitch"], self.torque, color=FORCE)
         bars.axhline(0.0, color=PALE, linewidth=1.0)
         bars.set(ylim=(-16, 16), ylabel="torque that is left (N m)")
         left = np.linalg.norm(self.torque)
-        tilt = np.rad2deg(motion.angles(self.robot.inertia)[-1])
+        turning = np.linalg.solve(self.robot.inertia, motion.torque[0])
         if not stands.any():
             self.say("nobody stands: the robot falls, and does not turn")
         elif left < 0.05:
             self.say("the standing legs carry the robot and do not turn it")
         else:
+            sides = ("left" if turning[0] < 0.0 else "right"), ("up" if turning[1] < 0.0 else "down")
+            soon = np.sqrt(2.0 * np.deg2rad(10.0) / np.linalg.norm(turning))
             self.say(
-                f"{left:.1f} N m are left: after {SLOT} s the robot has rolled {tilt[0]:+.1f}° to its right"
-                f" and pitched {tilt[1]:+.1f}° nose down"
+                f"{left:.1f} N m are left: the robot rolls to its {sides[0]} and pitches nose {sides[1]},"
+                f" by 10° in {soon:.2f} s"
             )
         self.board.show(picture, view, "contacts from above with the load on each, and the centre of mass")
 
@@ -285,7 +294,7 @@ class TightOrNot(Panel):
     }  # fmt: skip
     """By name, who stands."""
 
-    CHARGES = np.logspace(-4, -1, 25)
+    CHARGES = np.logspace(-4, -1, 19)
 
     def __init__(self) -> None:
         self.robot = Robot.go1()
@@ -363,6 +372,10 @@ class TightOrNot(Panel):
         )
         axes.set(xlim=(-0.36, 0.36), ylim=(-0.27, 0.27))
         axes.legend(loc="center left", frameon=False)
+
+
+def _nose(pitch: float) -> str:
+    return "down" if pitch > 0.0 else "up"
 
 
 def _slider(name: str, value: float, low: float, high: float, step: float) -> ipywidgets.FloatSlider:
