@@ -113,15 +113,13 @@ class ForcesAndFeet(Panel):
             tidy(axes)
             axes.axhline(0.0, color=PALE, linewidth=1.0)
         a, torque, turned = motion.a[0], motion.torque[0, 1], abs(np.rad2deg(pitch[-1]))
-        if turned < 0.5:
-            end = "as level as before"
-        else:
-            # Eq. 8 with small angles is no longer true where the robot turns over.
-            end = (f"{turned:.0f}°" if turned < 90.0 else "head over heels,") + f" nose {_nose(pitch[-1])}"
+        # Beyond a right angle, eq. 8 with its small angles says no more than that the robot turns over.
+        size = f"{turned:.0f}°" if turned < 90.0 else "over 90°"
         self.say(
-            f"acceleration {a[0]:+.2f} m/s² ahead, {a[2]:+.2f} m/s² up; torque {abs(torque):.2f} N m"
-            f"{f' nose {_nose(torque)}' if abs(torque) >= 0.005 else ''};"
-            f" after {SLOT} s {motion.v[-1, 0]:+.2f} m/s ahead and {end}"
+            f"acceleration {a[0]:+.2f} m/s² ahead, {a[2]:+.2f} m/s² up;"
+            f" torque {abs(torque):.1f} N m{f' nose {_nose(torque)}' if abs(torque) >= 0.05 else ''};"
+            f" after {SLOT} s {motion.v[-1, 0]:+.2f} m/s,"
+            f" {f'{size} nose {_nose(pitch[-1])}' if turned >= 0.5 else 'level'}"
         )
         self.board.show(
             picture, view, "a robot from its right, forces on its feet, its path and where it turns"
