@@ -6,7 +6,7 @@ from typing import Literal
 import daqp
 import numpy as np
 import osqp
-from scipy import sparse
+from scipy import linalg, sparse
 
 Solver = Literal["osqp", "daqp"]
 
@@ -105,3 +105,25 @@ def _solve_daqp(P, q, A, lower, upper) -> np.ndarray | None:
     lower, upper = np.maximum(lower, -bound), np.minimum(upper, bound)
     u, _, flag, _ = daqp.solve(P, q, np.ascontiguousarray(A), upper, lower, sense)
     return np.array(u) if flag > 0 and np.isfinite(u).all() else None
+
+
+def directions_left(
+    P: np.ndarray, A: np.ndarray, lower: np.ndarray, upper: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the curvatures of the cost in the directions that the equality constraints leave.
+
+    The minimiser is unique exactly when none is zero; their ratio is the condition number of what is left to
+    decide. (Inequalities that bind can decide more.)
+
+    Args:
+        P: ``(n, n)``.
+        A: ``(m, n)``.
+        lower: ``(m,)``.
+        upper: ``(m,)``; where it is equal to ``lower``, the row is an equality.
+
+    Returns:
+        Curvatures ``(d,)``, ascending, and as columns of ``(n, d)`` the directions, of length one.
+    """
+    free = linalg.null_space(A[lower == upper])
+    curvatures, turned = np.linalg.eigh(free.T @ P @ free)
+    return curvatures, free @ turned

@@ -15,6 +15,29 @@ TICK = 0.002
 
 
 @dataclass(frozen=True)
+class Constraints:
+    """Which constraints the controller's program keeps; all of them unless a lesson leaves one out.
+
+    Without one, the program counts on something that the robot does not have.
+
+    Attributes:
+        feet: standing feet stay (eq. 40).
+        wheels: wheels stay on the ground and don't slide sideways (eq. 41).
+        turning_axle: eq. 41 knows that a wheel's axle turns with the robot. The paper's does not.
+        friction: the sides of the friction pyramids (eq. 42); without them a wheel is taken to push, too.
+        pushing: the ground can't pull (eqs 26 and 42). The sides imply as much, so it takes both to allow it.
+        torques: the motors' limits (eq. 43).
+    """
+
+    feet: bool = True
+    wheels: bool = True
+    turning_axle: bool = True
+    friction: bool = True
+    pushing: bool = True
+    torques: bool = True
+
+
+@dataclass(frozen=True)
 class Gains:
     """Gains and weights. A PD gain is an acceleration per unit of error (eqs 34–36).
 
@@ -35,6 +58,7 @@ class Gains:
         least_force: with which a standing leg presses on the ground at least, N; it keeps what it has.
         force_weight: price on λ, per N².
         acceleration_weight: price on q̈.
+        constraints: which of them the program keeps.
     """
 
     com_kp: np.ndarray = field(default_factory=lambda: np.array([200.0, 200.0, 400.0]))
@@ -56,6 +80,7 @@ class Gains:
     least_force: float = 3.0
     force_weight: float = 1e-3
     acceleration_weight: float = 1e-4
+    constraints: Constraints = Constraints()
 
 
 @dataclass(frozen=True)
@@ -123,3 +148,62 @@ class Reference:
     forces: np.ndarray
     omega: np.ndarray = field(default_factory=lambda: np.zeros(3))
     angular_acceleration: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+
+def delay_margin(kp: float, kd: float, ki: float = 0.0) -> float:
+    """Return after which delay the error of eq. 34 grows instead of fading, in seconds.
+
+    One axis of trunk or CoM is taken to do exactly as asked, but late:
+    ``z̈(t) = −(kp e + kd ė + ki ∫e)(t − d)``. Where the loop's gain ``|L(iω)| = |ki + iω kp − ω² kd| / ω³``
+    is one, its phase is ``φ`` away from that of an error that feeds itself. A delay turns the phase by
+    ``ω d``, so the margin is ``φ / ω``.
+
+    Args:
+        kp: acceleration per unit of error.
+        kd: per unit of its rate.
+        ki: per unit of its integral.
+
+    Raises:
+        ValueError: a gain is negative or not finite.
+    """
+    for name, gain in (("kp", kp), ("kd", kd), ("ki", ki)):
+        if not 0.0 <= gain < np.inf:
+            raise ValueError(f"{name}: {gain!r} is not a finite number of at least 0")
+    if ki > 0.0 and kp * kd <= ki:
+        return 0.0  # the integral alone makes it grow
+    squared = np.roots([1.0, -(kd**2), -(kp**2 - 2.0 * ki * kd), -(ki**2)])
+    omega = np.sqrt(squared.real[(np.abs(squared.imag) < 1e-9 * max(1.0, kd**2)) & (squared.real > 1e-12)])
+    loop = (ki + 1j * omega * kp - omega**2 * kd) / (1j * omega) ** 3
+    phase = np.mod(np.angle(-loop), 2.0 * np.pi)
+    return float(np.min(phase / omega, initial=np.inf))
+
+
+def delayed_error(
+    kp: float, kd: float, ki: float, delay: float, duration: float, step: float = 0.001
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return how an error of one fades, or grows, when eq. 34 acts late on one axis.
+
+    The axis starts at rest, beside its reference by one. Before the first command arrives nothing acts.
+
+    Args:
+        kp: gains, as for :func:`delay_margin`.
+        kd: likewise.
+        ki: likewise.
+        delay: in seconds.
+        duration: to simulate.
+        step: of the integration.
+
+    Returns:
+        Time and error, ``(N,)`` each. An error over 100 is cut off there.
+    """
+    count = round(duration / step) + 1
+    late = round(delay / step)
+    error, commands = np.ones(count), np.zeros(count)
+    rate = integral = 0.0
+    for i in range(count - 1):
+        commands[i] = -(kp * error[i] + kd * rate + ki * integral)
+        integral += step * error[i]
+        acceleration = commands[i - late] if i >= late else 0.0
+        error[i + 1] = np.clip(error[i] + step * rate + 0.5 * step**2 * acceleration, -100.0, 100.0)
+        rate += step * acceleration
+    return step * np.arange(count), error

@@ -21,7 +21,7 @@ import numpy as np
 
 from wfbook.go1_dynamics import GRAVITY, Go1Dynamics, cross, dot
 from wfbook.qp import QuadraticProgram, Solver
-from wfbook.reference import TICK, Gains, Ground, Reference
+from wfbook.reference import TICK, Constraints, Gains, Ground, Reference
 
 LEG_COLUMNS = 6 + np.arange(12).reshape(4, 3)
 """Where the joints of each leg stand in the 18 accelerations."""
@@ -165,15 +165,16 @@ def stationary_feet(contact: Contacts, damping: float) -> np.ndarray:
     return -contact.drift - damping * contact.velocity
 
 
-def fixed_wheels(contact: Contacts, damping: float) -> np.ndarray:
+def fixed_wheels(contact: Contacts, damping: float, turning_axle: bool = True) -> np.ndarray:
     """Return what ``J q̈`` must be for wheels that roll but don't slide, ``(4, 3)`` (Paper A, eq. 41).
 
     Only the entries along b and n are constraints; rolling is free. The axle turns with the calf, so
     ``d(b·v)/dt = b·a + ḃ·v`` with ``ḃ = −ω_n t``: without the second term a wheel that rolls and yaws
-    is asked to slide. ``damping`` as for feet.
+    is asked to slide. ``damping`` as for feet. The paper has no second term: ``turning_axle=False``.
     """
     required = -contact.drift - damping * contact.velocity
-    required[:, 1] += contact.yaw_rate * contact.velocity[:, 0]
+    if turning_axle:
+        required[:, 1] += contact.yaw_rate * contact.velocity[:, 0]
     return required
 
 
@@ -310,6 +311,7 @@ class WholeBodyController:
         lower[pressing] = np.where(ref.stance, -_FREE, 0.0)  # a leg in the air presses on nothing
         A[_TORQUES] = E[6:]
         lower[_TORQUES], upper[_TORQUES] = -robot.effort - h[6:], robot.effort - h[6:]
+        _leave_out(gains.constraints, ref, lower, upper)
         return P, q, A, lower, upper, contact
 
     def _held(self, ref: Reference, contact: Contacts) -> tuple[np.ndarray, np.ndarray]:
@@ -317,7 +319,8 @@ class WholeBodyController:
         damping = self.gains.contact_damping
         required = stationary_feet(contact, damping)
         if ref.wheels.any():
-            required = np.where(ref.wheels[:, None], fixed_wheels(contact, damping), required)
+            rolling = fixed_wheels(contact, damping, self.gains.constraints.turning_axle)
+            required = np.where(ref.wheels[:, None], rolling, required)
         free = np.empty((4, 3), bool)
         free[:] = ~ref.stance[:, None]
         free[:, 0] |= ref.wheels
@@ -363,6 +366,19 @@ class WholeBodyController:
         if self._last is not None and self._misses <= self.patience:
             return Command(self._last.torques, self._last.acceleration, self._last.forces, False)
         return Command(-2.0 * self.robot.velocity[6:], np.zeros(18), np.zeros((4, 3)), False)
+
+
+def _leave_out(kept: Constraints, ref: Reference, lower: np.ndarray, upper: np.ndarray) -> None:
+    """Loosen the rows of the constraints that are not kept. Legs in the air press on nothing all the same."""
+    moving = np.where(ref.wheels, not kept.wheels, not kept.feet)
+    rows = 6 + np.flatnonzero(np.repeat(moving, 3))
+    lower[rows], upper[rows] = -_FREE, _FREE
+    if not kept.friction:
+        upper[_FRICTION[ref.stance, :-1]] = _FREE
+    if not kept.pushing:
+        upper[_FRICTION[ref.stance, -1]] = _FREE
+    if not kept.torques:
+        lower[_TORQUES], upper[_TORQUES] = -_FREE, _FREE
 
 
 def pattern() -> tuple[np.ndarray, np.ndarray]:

@@ -15,6 +15,7 @@ PLANNED = "#0072B2"
 MEASURED = "#222222"
 ESTIMATED = "#56B4E9"
 FORCE = "#CC79A7"
+LIMIT = "#D55E00"  # what may not be crossed: friction, torque, time
 PAPER = "#FFFFFF"
 INK = "#222222"
 BODY = "#8A919C"
