@@ -6,6 +6,7 @@ it stands on and what it is asked, solve the program once, and see which of its 
 simulator that knows better.
 """
 
+import itertools
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -112,6 +113,27 @@ def limits_reached(stance: Stance, command: Command, least_force: float) -> list
             if torque[leg, joint] >= -_REACHED:
                 found.append(f"{LEGS[leg]} {name} is at its torque limit")
     return found
+
+
+def squeezes(points: np.ndarray) -> np.ndarray:
+    """Return forces on four points of a plane that add up to nothing: no force, no torque.
+
+    Two points that pull at each other along the line between them, for every pair; and one diagonal that is
+    lifted while the other is pressed. They are seven, and six of them are independent.
+
+    Args:
+        points: ``(4, 3)``, in the order of the legs, on a rectangle in a horizontal plane.
+
+    Returns:
+        ``(7, 4, 3)``, each force of length one.
+    """
+    forces = np.zeros((7, 4, 3))
+    for i, (first, second) in enumerate(itertools.combinations(range(4), 2)):
+        towards = points[second] - points[first]
+        forces[i, first] = towards / np.linalg.norm(towards)
+        forces[i, second] = -forces[i, first]
+    forces[6, :, 2] = 1.0, -1.0, -1.0, 1.0
+    return forces
 
 
 @dataclass(frozen=True)

@@ -142,37 +142,34 @@ def scrub(rehearsals: Mapping[str, Rehearsal]) -> Picture:
     return figure
 
 
-def internal_forces(stance: Stance, directions: np.ndarray, count: int = 3) -> Picture:
-    """Draw forces that do nothing: seen from above they squeeze and twist, and the robot feels none of it.
+def internal_forces(stance: Stance, forces: np.ndarray) -> Picture:
+    """Draw forces that do nothing, seen from above: feet squeeze and twist, the robot feels none of it.
 
     Args:
         stance: with all legs on the ground.
-        directions: ``(30, d)`` of :func:`wfbook.qp.directions_left`, the undecided ones first.
-        count: how many are drawn.
+        forces: ``(m, 4, 3)`` in the world, at most about one; one panel each.
     """
     figure = Picture(8.0, 2.6)
-    row = figure.subplots(1, count, sharex=True, sharey=True)
+    row = figure.subplots(1, len(forces), sharex=True, sharey=True)
     points, com = stance.robot.centres, stance.robot.com
-    for axes, direction in zip(row, directions.T, strict=False):
+    for axes, force in zip(row, forces, strict=True):
         tidy(axes)
-        force = direction[18:].reshape(4, 3)
-        scale = 0.2 / np.abs(force).max()
         axes.plot(*points[[0, 1, 3, 2, 0], :2].T, color=PALE, linewidth=1.0, zorder=1)
         axes.plot(*com[:2], "o", color=BODY, markersize=7)
-        for leg in range(4):
+        for leg, name in enumerate(LEGS):
             axes.plot(*points[leg, :2], "o", color=MODE_COLOURS[int(stance.ref.wheels[leg])], markersize=8)
-            tip = points[leg, :2] + scale * force[leg, :2]
-            axes.add_patch(_arrow(points[leg, :2], tip, FORCE))
-            vertical = scale * force[leg, 2]
-            if abs(vertical) > 0.01:
-                sign = "⊙" if vertical > 0 else "⊗"  # out of the page, into it
-                place = points[leg, :2] + [0.0, 0.09 * np.sign(points[leg, 1])]
-                axes.text(*place, f"{sign} {abs(vertical) / 0.2:.1f}", color=FORCE, ha="center", va="center")
+            if np.linalg.norm(force[leg, :2]) > 0.1:
+                tip = points[leg, :2] + _LONGEST * force[leg, :2]
+                axes.add_patch(_arrow(points[leg, :2], tip, FORCE, gid=f"force {name}"))
+            if abs(force[leg, 2]) > 0.1:
+                text = "up" if force[leg, 2] > 0 else "down"
+                place = points[leg, :2] + [0.0, 0.08 * np.sign(points[leg, 1])]
+                axes.text(*place, text, color=FORCE, ha="center", va="center", gid=f"force {name}")
         axes.set_aspect("equal")
         axes.set_xlabel("x, forward (m)")
     row[0].set_ylabel("y, left (m)")
-    row[0].set_xlim(-0.42, 0.42)
-    row[0].set_ylim(-0.32, 0.32)
+    row[0].set_xlim(-0.36, 0.36)
+    row[0].set_ylim(-0.26, 0.26)
     return figure
 
 
