@@ -102,10 +102,10 @@ def limits_reached(stance: Stance, command: Command, least_force: float) -> list
     found = []
     for leg in np.flatnonzero(stance.ref.stance):
         sides = slack[leg, 2:4] if stance.ref.wheels[leg] else slack[leg, :-1]  # a wheel has no sides along t
-        if local[leg, 2] <= least_force + _REACHED:
-            found.append(f"{LEGS[leg]} carries nothing more")
-        elif sides.min() < -_REACHED:
+        if sides.min() < -_REACHED:
             found.append(f"{LEGS[leg]} needs more friction than there is")
+        elif local[leg, 2] <= least_force + _REACHED:
+            found.append(f"{LEGS[leg]} carries nothing more")
         elif sides.min() <= _REACHED:
             found.append(f"{LEGS[leg]} uses all its friction")
     for leg in range(4):
