@@ -201,7 +201,7 @@ def tick_times(parts: Mapping[str, Mapping[str, float]]) -> Picture:
 
 
 def draw_side(axes: Any, stance: Stance, command: "Command") -> None:
-    """Draw a standing robot from its left, the forces on it, and the friction cones they must be in."""
+    """Draw a standing robot from its left, the forces on it (those of the right legs pale), and friction cones."""
     robot, model = stance.robot, stance.robot.model
     tidy(axes)
     scale = _LONGEST * 4.0 / (robot.mass * 9.81)
@@ -217,23 +217,24 @@ def draw_side(axes: Any, stance: Stance, command: "Command") -> None:
         chain = np.array([thigh, calf, robot.centres[leg]])
         far = name.endswith("R")
         axes.plot(chain[:, 0], chain[:, 2], color=PALE if far else BODY, linewidth=3 if far else 5, zorder=1)
-        if far:
-            continue
         kind = int(stance.ref.wheels[leg])
         standing = bool(stance.ref.stance[leg])
+        start, force = contact[leg, [0, 2]], scale * command.forces[leg, [0, 2]]
+        if standing and np.linalg.norm(force) > 0.5 * scale:
+            arrow = _arrow(start, start + force, FORCE, gid=f"force {name}")
+            arrow.set_alpha(0.35 if far else 1.0)
+            axes.add_patch(arrow)
+        if far:
+            continue
         axes.plot(
             *robot.centres[leg, [0, 2]], "o", color=MODE_COLOURS[kind] if standing else SWING, markersize=9
         )
         if not standing:
             continue
         mu, high = stance.ground.mu_foot[leg], 0.16
-        start = contact[leg, [0, 2]]
         if not kind:
             cone = start + high * np.array([[0.0, 0.0], [mu, 1.0], [-mu, 1.0]])
             axes.add_patch(Polygon(cone, color=LIMIT, alpha=0.13, linewidth=0, gid=f"cone {name}"))
-        force = command.forces[leg, [0, 2]]
-        if np.linalg.norm(force) > 0.5:
-            axes.add_patch(_arrow(start, start + scale * force, FORCE, gid=f"force {name}"))
     axes.set_aspect("equal")
     axes.set_xlim(-0.42, 0.42)
     axes.set_ylim(-0.04, 0.5)
@@ -283,16 +284,18 @@ def answer(stance: Stance, command: "Command") -> Picture:
     grid = figure.add_gridspec(1, 6, width_ratios=(1, 1, 1, 1, 0.12, 1.7))
     local = np.einsum("lij,lj->li", stance.contact.basis, command.forces)
     pyramids = friction_pyramids(stance.ground, stance.contact, stance.ref.wheels)
-    largest = max(20.0, 1.15 * np.abs(local[:, :2]).max())
+    outlines = [pyramid_outline(P, max(n, 0.0)) for P, n in zip(pyramids, local[:, 2], strict=True)]
+    largest = max(20.0, 1.15 * np.abs(local[:, :2]).max(), 1.1 * np.abs(outlines).max())
     first = None
     for leg, name in enumerate(LEGS):
         axes = first = figure.add_subplot(grid[leg], sharex=first, sharey=first)
         tidy(axes)
         standing, colour = bool(stance.ref.stance[leg]), (FOOT, WHEEL)[int(stance.ref.wheels[leg])]
         if standing:
-            outline = pyramid_outline(pyramids[leg], max(local[leg, 2], 0.0))
             axes.add_patch(
-                Polygon(outline, facecolor=(colour, 0.25), edgecolor=LIMIT, linewidth=1.5, gid="pyramid")
+                Polygon(
+                    outlines[leg], facecolor=(colour, 0.25), edgecolor=LIMIT, linewidth=1.5, gid="pyramid"
+                )
             )
             axes.plot(*local[leg, :2], "o", color=FORCE, markersize=7, gid="force")
         axes.set_title(f"{name}  {local[leg, 2]:.0f} N" if standing else f"{name}  swings", fontsize="medium")
