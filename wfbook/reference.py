@@ -36,6 +36,28 @@ class Constraints:
     pushing: bool = True
     torques: bool = True
 
+    def leave_out(
+        self, lower: np.ndarray, upper: np.ndarray, ref: "Reference", friction: np.ndarray, torques: slice
+    ) -> None:
+        """Loosen the bounds of constraints that are not kept. Legs in the air press on nothing all the same.
+
+        Args:
+            lower: of the program's rows; changed in place. Rows 6 to 17 are the contacts', three a leg.
+            upper: likewise.
+            ref: says which legs stand, and which on wheels.
+            friction: ``(4, n)`` rows of the pyramids; the last of each says that the leg pushes.
+            torques: rows of the motors' limits.
+        """
+        moving = np.where(ref.wheels, not self.wheels, not self.feet)
+        rows = 6 + np.flatnonzero(np.repeat(moving, 3))
+        lower[rows], upper[rows] = -np.inf, np.inf
+        if not self.friction:
+            upper[friction[ref.stance, :-1]] = np.inf
+        if not self.pushing:
+            upper[friction[ref.stance, -1]] = np.inf
+        if not self.torques:
+            lower[torques], upper[torques] = -np.inf, np.inf
+
 
 @dataclass(frozen=True)
 class Gains:

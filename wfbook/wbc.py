@@ -21,7 +21,7 @@ import numpy as np
 
 from wfbook.go1_dynamics import GRAVITY, Go1Dynamics, cross, dot
 from wfbook.qp import QuadraticProgram, Solver
-from wfbook.reference import TICK, Constraints, Gains, Ground, Reference
+from wfbook.reference import TICK, Gains, Ground, Reference
 
 LEG_COLUMNS = 6 + np.arange(12).reshape(4, 3)
 """Where the joints of each leg stand in the 18 accelerations."""
@@ -169,12 +169,11 @@ def fixed_wheels(contact: Contacts, damping: float, turning_axle: bool = True) -
     """Return what ``J q̈`` must be for wheels that roll but don't slide, ``(4, 3)`` (Paper A, eq. 41).
 
     Only the entries along b and n are constraints; rolling is free. The axle turns with the calf, so
-    ``d(b·v)/dt = b·a + ḃ·v`` with ``ḃ = −ω_n t``: without the second term a wheel that rolls and yaws
-    is asked to slide. ``damping`` as for feet. The paper has no second term: ``turning_axle=False``.
+    ``d(b·v)/dt = b·a + ḃ·v`` with ``ḃ = −ω_n t``: without the second term (the paper has none) a wheel that
+    rolls and yaws is asked to slide. ``damping`` as for feet.
     """
     required = -contact.drift - damping * contact.velocity
-    if turning_axle:
-        required[:, 1] += contact.yaw_rate * contact.velocity[:, 0]
+    required[:, 1] += turning_axle * contact.yaw_rate * contact.velocity[:, 0]
     return required
 
 
@@ -309,18 +308,16 @@ class WholeBodyController:
         pressing = _FRICTION[:, -1]
         upper[pressing] = np.where(ref.stance, -gains.least_force, 0.0)
         lower[pressing] = np.where(ref.stance, -_FREE, 0.0)  # a leg in the air presses on nothing
-        A[_TORQUES] = E[6:]
-        lower[_TORQUES], upper[_TORQUES] = -robot.effort - h[6:], robot.effort - h[6:]
-        _leave_out(gains.constraints, ref, lower, upper)
+        A[_TORQUES], lower[_TORQUES], upper[_TORQUES] = E[6:], -robot.effort - h[6:], robot.effort - h[6:]
+        gains.constraints.leave_out(lower, upper, ref, _FRICTION, _TORQUES)
         return P, q, A, lower, upper, contact
 
     def _held(self, ref: Reference, contact: Contacts) -> tuple[np.ndarray, np.ndarray]:
         """Return bounds ``(12,)`` of the contacts' accelerations; in the air, and along a wheel's t, none."""
-        damping = self.gains.contact_damping
+        damping, axle = self.gains.contact_damping, self.gains.constraints.turning_axle
         required = stationary_feet(contact, damping)
         if ref.wheels.any():
-            rolling = fixed_wheels(contact, damping, self.gains.constraints.turning_axle)
-            required = np.where(ref.wheels[:, None], rolling, required)
+            required = np.where(ref.wheels[:, None], fixed_wheels(contact, damping, axle), required)
         free = np.empty((4, 3), bool)
         free[:] = ~ref.stance[:, None]
         free[:, 0] |= ref.wheels
@@ -366,19 +363,6 @@ class WholeBodyController:
         if self._last is not None and self._misses <= self.patience:
             return Command(self._last.torques, self._last.acceleration, self._last.forces, False)
         return Command(-2.0 * self.robot.velocity[6:], np.zeros(18), np.zeros((4, 3)), False)
-
-
-def _leave_out(kept: Constraints, ref: Reference, lower: np.ndarray, upper: np.ndarray) -> None:
-    """Loosen the rows of the constraints that are not kept. Legs in the air press on nothing all the same."""
-    moving = np.where(ref.wheels, not kept.wheels, not kept.feet)
-    rows = 6 + np.flatnonzero(np.repeat(moving, 3))
-    lower[rows], upper[rows] = -_FREE, _FREE
-    if not kept.friction:
-        upper[_FRICTION[ref.stance, :-1]] = _FREE
-    if not kept.pushing:
-        upper[_FRICTION[ref.stance, -1]] = _FREE
-    if not kept.torques:
-        lower[_TORQUES], upper[_TORQUES] = -_FREE, _FREE
 
 
 def pattern() -> tuple[np.ndarray, np.ndarray]:

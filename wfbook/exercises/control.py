@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from wfbook import simulate
 from wfbook.exercises.answer import WrongAnswer, array, called, number
 from wfbook.go1 import leg_kinematics
 from wfbook.reference import Gains, delay_margin
@@ -197,8 +198,6 @@ def slow_computer(gains: Any) -> str:
             margin = delay_margin(values[f"{task}_kp"][axis], values[f"{task}_kd"][axis], integral[axis])
             if margin < _SLOW:
                 raise WrongAnswer(f"{task}, axis {name}: these gains bear {1e3 * margin:.1f} ms, not 30")
-    from wfbook import simulate
-
     push = (_PUSH, 0.2, PUSH_DURATION)
     run = simulate.run(MOTIONS["stand on four feet"](), delay=_SLOW, hold=0.8, gains=gains, push=push)
     if run.metrics["fell"]:

@@ -201,7 +201,7 @@ def tick_times(parts: Mapping[str, Mapping[str, float]]) -> Picture:
 
 
 def draw_side(axes: Any, stance: Stance, command: "Command") -> None:
-    """Draw a standing robot from its left, the forces on it (those of the right legs pale), and friction cones."""
+    """Draw a standing robot from its left, its friction cones and forces (those of the right legs pale)."""
     robot, model = stance.robot, stance.robot.model
     tidy(axes)
     scale = _LONGEST * 4.0 / (robot.mass * 9.81)

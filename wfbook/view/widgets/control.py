@@ -8,10 +8,14 @@ from typing import TYPE_CHECKING
 import ipywidgets
 import numpy as np
 
+from wfbook import planner, simulate
 from wfbook.go1_dynamics import Go1Dynamics
 from wfbook.reference import Constraints, Gains, delay_margin, delayed_error
 from wfbook.stance import Stance, limits_reached, stand
+from wfbook.terrain import flat
+from wfbook.view import figures
 from wfbook.view.drawings import control as drawings
+from wfbook.view.replay import Replay
 from wfbook.view.style import LIMIT, MEASURED, PLANNED, Picture, tidy
 from wfbook.view.widgets.board import Board
 from wfbook.view.widgets.panel import Panel, table
@@ -246,23 +250,14 @@ class Setting:
 
 @cache
 def _standing(start: tuple[str, ...]) -> "Plan":
-    from wfbook import planner
-    from wfbook.terrain import flat
-
     return planner.solve(planner.Problem(flat(), goal=(0.0, 0.0), slots=4, start_end_effectors=start))
-
-
-def _stored(name: str) -> "Plan":
-    from wfbook import planner
-
-    return planner.stored(name)
 
 
 MOTIONS: dict[str, Callable[[], "Plan"]] = {
     "stand on four feet": lambda: _standing(("foot",) * 4),
     "stand on a foot and three wheels": lambda: _standing(("wheel", "foot", "wheel", "wheel")),
-    "walk": lambda: _stored("flat-feet"),
-    "roll": lambda: _stored("flat"),
+    "walk": lambda: planner.stored("flat-feet"),
+    "roll": lambda: planner.stored("flat"),
 }
 """By name, what makes the plan that is executed."""
 
@@ -271,8 +266,6 @@ PUSH_DURATION = 0.2
 
 def simulated(setting: Setting, progress: Callable[[float, float], None] | None = None) -> "Run":
     """Run an experiment in MuJoCo, with the true state."""
-    from wfbook import simulate
-
     angle = np.radians(setting.direction_deg)
     force = setting.push * np.array([np.cos(angle), np.sin(angle), 0.0])
     return simulate.run(
@@ -377,9 +370,6 @@ class Experiment(Panel):
             view.value = ""
 
     def _show(self, run: "Run") -> None:
-        from wfbook.view import figures
-        from wfbook.view.replay import Replay
-
         self.run = run
         fall = run.metrics["fall_time_s"]
         verdict = "stayed upright" if fall is None else f"fell after {fall:.2f} s"
