@@ -12,35 +12,13 @@ from wfbook.swing import swing_position
 from wfbook.view.drawings.swing import SMOOTHNESS_NAMES
 from wfbook.view.style import BODY, INK, MODE_COLOURS, PALE, PLANNED, SWING, Picture, tidy
 from wfbook.view.widgets.board import Board
+from wfbook.view.widgets.controls import choice, slider
 from wfbook.view.widgets.panel import Panel
 
 _SAMPLES = 121
 _LEG = 0
 _PARTS = (("hip", ":"), ("thigh", "-"), ("calf", "--"))
 _LINK = 0.213
-
-
-def _slider(value: float, low: float, high: float, step: float, name: str) -> ipywidgets.FloatSlider:
-    return ipywidgets.FloatSlider(
-        value=value,
-        min=low,
-        max=high,
-        step=step,
-        description=name,
-        style={"description_width": "10em"},
-        layout=ipywidgets.Layout(width="26em"),
-        continuous_update=False,
-    )
-
-
-def _choice(options: object, value: object, name: str) -> ipywidgets.Dropdown:
-    return ipywidgets.Dropdown(
-        options=options,
-        value=value,
-        description=name,
-        style={"description_width": "10em"},
-        layout=ipywidgets.Layout(width="26em"),
-    )
 
 
 class SwingPlayground(Panel):
@@ -62,16 +40,16 @@ class SwingPlayground(Panel):
     """
 
     def __init__(self) -> None:
-        self.lifts_from = _choice(END_EFFECTORS, "foot", "lifts from")
-        self.lands_on = _choice(END_EFFECTORS, "wheel", "lands on")
-        self.speed = _slider(0.5, 0.0, 1.0, 0.05, "robot's speed (m/s)")
-        self.start_velocity = _slider(0.0, -0.5, 1.5, 0.05, "start velocity (m/s)")
-        self.end_velocity = _slider(0.5, -0.5, 1.5, 0.05, "end velocity (m/s)")
-        self.step = _slider(0.2, -0.1, 0.35, 0.01, "step (m)")
-        self.rise = _slider(0.0, -0.05, 0.08, 0.01, "rise (m)")
-        self.apex = _slider(0.06, 0.0, 0.12, 0.005, "apex (m)")
-        self.duration = _slider(0.3, 0.08, 0.6, 0.01, "duration (s)")
-        self.given = _choice([(name, s) for s, name in SMOOTHNESS_NAMES.items()], 2, "given at the ends")
+        self.lifts_from = choice(END_EFFECTORS, "foot", "lifts from")
+        self.lands_on = choice(END_EFFECTORS, "wheel", "lands on")
+        self.speed = slider(0.5, 0.0, 1.0, 0.05, "robot's speed (m/s)")
+        self.start_velocity = slider(0.0, -0.5, 1.5, 0.05, "start velocity (m/s)")
+        self.end_velocity = slider(0.5, -0.5, 1.5, 0.05, "end velocity (m/s)")
+        self.step = slider(0.2, -0.1, 0.35, 0.01, "step (m)")
+        self.rise = slider(0.0, -0.05, 0.08, 0.01, "rise (m)")
+        self.apex = slider(0.06, 0.0, 0.12, 0.005, "apex (m)")
+        self.duration = slider(0.3, 0.08, 0.6, 0.01, "duration (s)")
+        self.given = choice([(name, s) for s, name in SMOOTHNESS_NAMES.items()], 2, "given at the ends")
         self.jumps = np.zeros((2, 2))
         self.load = 0.0
         self._hip = nominal()["hips"][_LEG] - nominal()["trunk"]
@@ -239,9 +217,9 @@ class MixedSwings(Panel):
 
     def __init__(self) -> None:
         self.board = Board({"A": (12.0, 0.0), "B": (28.0, 4.0)}, {"A": PLANNED, "B": PLANNED})
-        self.share = _slider(0.5, 0.0, 1.0, 0.05, "share of B")
-        self.velocity_a = _slider(0.0, 0.0, 1.5, 0.1, "A lands with (m/s)")
-        self.velocity_b = _slider(0.8, 0.0, 1.5, 0.1, "B lands with (m/s)")
+        self.share = slider(0.5, 0.0, 1.0, 0.05, "share of B")
+        self.velocity_a = slider(0.0, 0.0, 1.5, 0.1, "A lands with (m/s)")
+        self.velocity_b = slider(0.8, 0.0, 1.5, 0.1, "B lands with (m/s)")
         self.hurry = ipywidgets.Checkbox(value=False, description="B takes half the time", indent=False)
         self.mismatch = 0.0
         super().__init__([self.share, self.velocity_a, self.velocity_b, self.hurry], [])
