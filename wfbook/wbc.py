@@ -29,7 +29,6 @@ LEG_COLUMNS = 6 + np.arange(12).reshape(4, 3)
 
 _DIRECTIONS = np.array([(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)], float)
 _SIDES = len(_DIRECTIONS)
-"""How much nearer the sides of a pyramid inside the cone are than its corners."""
 
 FRICTION_ROWS = _SIDES + 1
 """Sides of a foot's friction pyramid, and the one that says that it pushes."""

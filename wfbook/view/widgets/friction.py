@@ -42,7 +42,7 @@ class ForceOnSlope(Panel):
         self.weight = 0.25 * nominal()["mass"] * float(-GRAVITY[2])
         self.board = Board({"force": (0.0, self.weight)}, {"force": FORCE})
         self.end_effector = choice(END_EFFECTORS, "foot", "end effector")
-        self.slope = slider(15.0, -30.0, 30.0, 1.0, "slope down ahead (°)")
+        self.slope = slider(15.0, -30.0, 30.0, 1.0, "slope, down (°)")
         self.mu = slider(0.4, 0.05, 1.0, 0.05, "μ")
         self.across = slider(0.0, -40.0, 40.0, 1.0, "force across (N)")
         self.friction = ipywidgets.Checkbox(value=True, description="friction constraint", indent=False)
