@@ -254,6 +254,10 @@ class MixedSwings(Panel):
         tidy(axes)
         for curve, name in zip(curves, "AB", strict=True):
             axes.plot(100 * curve[:, 0], 100 * curve[:, 2], color=PALE, linewidth=1.6, gid=name)
+            place = 100 * curve[-1, [0, 2]]
+            axes.annotate(
+                name, place, textcoords="offset points", xytext=(10, 8), color=PLANNED, weight="bold"
+            )
         axes.plot(
             100 * direct[:, 0],
             100 * direct[:, 2],
