@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from wfbook.swing import quintic_basis, septic_basis, swing_position
+from wfbook.swing import condition_matrix, conditions, quintic_basis, septic_basis, swing_position
 
 START, END = np.array([0.1, -0.2, 0.0]), np.array([0.35, -0.15, 0.08])
 V0, VF = np.array([0.4, 0.0, 0.0]), np.array([0.6, 0.1, 0.0])
@@ -42,3 +42,33 @@ def test_time_reversal_swaps_the_ends():
     phase = np.linspace(0.0, 1.0, 11)
     back = swing_position(1 - phase, 0.3, END, START, 0.06, -VF, -V0)
     np.testing.assert_allclose(back, swing(phase), atol=1e-12)
+
+
+@pytest.mark.parametrize("apex", [False, True])
+@pytest.mark.parametrize("smoothness", [0, 1, 2])
+def test_G_is_square_regular_and_says_what_a_polynomial_does(smoothness, apex):
+    G, found = condition_matrix(smoothness, apex), conditions(smoothness, apex)
+    assert G.shape == (len(found),) * 2 and abs(np.linalg.det(G)) > 1e-6
+    a = np.random.default_rng(0).standard_normal(len(found))
+    polynomial = np.polynomial.Polynomial(a)
+    for row, (phase, order) in zip(G, found, strict=True):
+        assert row @ a == pytest.approx((polynomial.deriv(order) if order else polynomial)(phase))
+
+
+@pytest.mark.parametrize("smoothness", [0, 1, 2])
+def test_fewer_conditions_keep_the_rest(smoothness):
+    def rough(phase, derivative):
+        return swing_position(np.array(phase), 0.3, START, END, 0.06, V0, VF, derivative, smoothness)
+
+    np.testing.assert_allclose(rough([0.0, 1.0], 0), [START, END], atol=1e-12)
+    assert rough([0.5], 0)[0, 2] == pytest.approx(0.1) and rough([0.5], 1)[0, 2] == pytest.approx(
+        0.0, abs=1e-11
+    )
+    met = np.abs(rough([0.0, 1.0], 1) - [V0, VF]).max() < 1e-9
+    assert met == (smoothness >= 1)
+    assert (np.abs(rough([0.0, 1.0], 2)).max() < 1e-9) == (smoothness >= 2)
+
+
+def test_other_smoothness_is_refused():
+    with pytest.raises(ValueError, match="smoothness"):
+        quintic_basis(np.zeros(1), smoothness=3)

@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from wfbook.go1 import ASSETS, FOOT_RADIUS, WHEEL_HALF_WIDTH, WHEEL_RADIUS, leg_angles
+from wfbook.go1 import ASSETS, FOOT_RADIUS, WHEEL_HALF_WIDTH, WHEEL_RADIUS, leg_angles, leg_kinematics
 from wfbook.modes import LEGS
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
@@ -278,3 +278,39 @@ class Go1Dynamics:
             if np.abs(com - self.com).max() < 1e-12:
                 break
         return qpos
+
+
+def leg_motion(
+    leg: int, ends_b: np.ndarray, velocities_b: np.ndarray, accelerations_b: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return how a leg's joints move, and the torques that make them, while its end goes along a path.
+
+    The trunk is level and does not accelerate, nothing touches the leg, the wheel spins freely: the leg's own
+    rows of the equations of motion (Paper A, eq. 37) without contact forces.
+
+    Args:
+        leg: index in :data:`wfbook.modes.LEGS`.
+        ends_b: ``(n, 3)`` centre of foot and wheel in the trunk's frame.
+        velocities_b: ``(n, 3)`` of it, relative to the trunk.
+        accelerations_b: ``(n, 3)``.
+
+    Returns:
+        Angles, rates and torques of hip, thigh and calf, ``(n, 3)`` each.
+
+    Raises:
+        ValueError: when a point is out of reach.
+    """
+    robot, own = Go1Dynamics(), slice(6 + 3 * leg, 9 + 3 * leg)
+    qpos, posture = np.zeros(23), np.tile([0.0, 0.9, -1.8], (4, 1))
+    qpos[3] = 1.0
+    samples = []
+    for end, velocity, acceleration in zip(ends_b, velocities_b, accelerations_b, strict=True):
+        posture[leg] = leg_angles(leg, end)
+        rate = np.linalg.solve(leg_kinematics(posture)[1][leg], velocity)
+        qvel = np.zeros(22)
+        qpos[1 + MOTORS], qvel[MOTORS[3 * leg : 3 * leg + 3]] = posture.ravel(), rate
+        robot.update(qpos, qvel)
+        bend = np.linalg.solve(robot.centre_jacobian[leg][:, own], acceleration - robot.centre_drift[leg])
+        samples.append((posture[leg].copy(), rate, robot.M[own, own] @ bend + robot.h[own]))
+    angles, rates, torques = np.array(samples).transpose(1, 0, 2)
+    return angles, rates, torques

@@ -12,28 +12,63 @@ import numpy as np
 from numpy.polynomial import polynomial as poly
 
 
+def conditions(smoothness: int = 2, apex: bool = False) -> list[tuple[float, int]]:
+    """List what a swing's polynomial has to meet (Paper A, eqs 4 and 5).
+
+    Args:
+        smoothness: how many derivatives are given at lift-off and at touch-down, beside the position. Paper
+            A gives two, velocity and acceleration; fewer are there to see what those are good for.
+        apex: whether position and velocity at mid-swing are given, too.
+
+    Returns:
+        Pairs of a phase and an order: 0 position, 1 velocity, 2 acceleration.
+    """
+    if smoothness not in (0, 1, 2):
+        raise ValueError(f"smoothness: must be 0, 1 or 2, is {smoothness!r}")
+    found = [(s, order) for s in (0.0, 1.0) for order in range(smoothness + 1)]
+    return found + [(0.5, 0), (0.5, 1)] * apex
+
+
+def condition_matrix(smoothness: int = 2, apex: bool = False) -> np.ndarray:
+    """Return the ``G`` of Paper A, eq. 3, square: row ``i`` is condition ``i`` of :func:`conditions`.
+
+    ``G @ a`` is what a polynomial with the coefficients ``a`` (ascending powers of the phase, eq. 2) does
+    there. ``smoothness`` 2 is the paper's quintic, with ``apex`` its septic.
+    """
+    rows = conditions(smoothness, apex)
+    powers = np.eye(len(rows))
+    return np.array([[poly.polyval(s, poly.polyder(power, order)) for power in powers] for s, order in rows])
+
+
 @cache
-def _coefficients(apex: bool) -> np.ndarray:
+def _coefficients(smoothness: int, apex: bool) -> np.ndarray:
     """Solve eq. 3, ``G a = g``, once for unit right-hand sides.
 
     Returns:
         ``(n, n)``: column ``i`` holds the coefficients (ascending powers, eq. 2) of the polynomial
-        that meets condition ``i`` with 1 and every other condition with 0. The conditions are those
-        of eqs 4 and 5: position, velocity and acceleration at the start, the same at the end, and
-        with ``apex`` position and velocity at mid-swing.
+        that meets condition ``i`` of :func:`conditions` with 1 and every other condition with 0.
     """
-    n = 8 if apex else 6
-    conditions = [(s, order) for s in (0.0, 1.0) for order in (0, 1, 2)]
-    if apex:
-        conditions += [(0.5, 0), (0.5, 1)]
-    G = np.array(
-        [[poly.polyval(s, poly.polyder(np.eye(n)[i], order)) for i in range(n)] for s, order in conditions]
-    )
     # All are whole numbers or halves; rounded to that, the ends are met exactly and not to 1e-13.
-    return np.rint(2.0 * np.linalg.inv(G)) / 2.0
+    return np.rint(2.0 * np.linalg.inv(condition_matrix(smoothness, apex))) / 2.0
 
 
-def quintic_basis(phase: np.ndarray, derivative: int = 0) -> np.ndarray:
+def _basis(
+    phase: np.ndarray, derivative: int, smoothness: int, wanted: tuple[tuple[float, int], ...]
+) -> np.ndarray:
+    """Evaluate the polynomials that belong to some conditions, zero for those that are not asked for."""
+    apex = any(s == 0.5 for s, _ in wanted)
+    given, coefficients = conditions(smoothness, apex), _coefficients(smoothness, apex)
+    phase = np.asarray(phase, float)
+    columns = [
+        poly.polyval(phase, poly.polyder(coefficients[:, given.index(condition)], derivative))
+        if condition in given
+        else np.zeros_like(phase)
+        for condition in wanted
+    ]
+    return np.stack(columns, axis=-1)
+
+
+def quintic_basis(phase: np.ndarray, derivative: int = 0, smoothness: int = 2) -> np.ndarray:
     """Evaluate the horizontal swing spline's basis (Paper A, eqs 2–4).
 
     The foot at phase ``s`` of a swing of duration ``T`` is
@@ -43,17 +78,15 @@ def quintic_basis(phase: np.ndarray, derivative: int = 0) -> np.ndarray:
     Args:
         phase: any shape ``(...)``, 0 at lift-off and 1 at touch-down.
         derivative: order of the derivative by the phase.
+        smoothness: see :func:`conditions`; 1 is a cubic, 0 a straight line that knows no velocities.
 
     Returns:
         ``(..., 4)``: the weights of ``p0``, ``T v0``, ``pf`` and ``T vf``.
     """
-    columns = [
-        poly.polyval(np.asarray(phase, float), poly.polyder(c, derivative)) for c in _coefficients(False).T
-    ]
-    return np.stack([columns[i] for i in (0, 1, 3, 4)], axis=-1)
+    return _basis(phase, derivative, smoothness, ((0.0, 0), (0.0, 1), (1.0, 0), (1.0, 1)))
 
 
-def septic_basis(phase: np.ndarray, derivative: int = 0) -> np.ndarray:
+def septic_basis(phase: np.ndarray, derivative: int = 0, smoothness: int = 2) -> np.ndarray:
     """Evaluate the vertical swing spline's basis (Paper A, eqs 2, 3, 5).
 
     The height at phase ``s`` is ``z0 * B[..., 0] + zf * B[..., 1] + z_apex * B[..., 2]``; velocity and
@@ -62,14 +95,12 @@ def septic_basis(phase: np.ndarray, derivative: int = 0) -> np.ndarray:
     Args:
         phase: any shape ``(...)``, 0 at lift-off and 1 at touch-down.
         derivative: order of the derivative by the phase.
+        smoothness: see :func:`conditions`; 1 is a quintic, 0 a cubic, a parabola between equal heights.
 
     Returns:
         ``(..., 3)``: the weights of the start, end and apex heights.
     """
-    columns = [
-        poly.polyval(np.asarray(phase, float), poly.polyder(c, derivative)) for c in _coefficients(True).T
-    ]
-    return np.stack([columns[i] for i in (0, 3, 6)], axis=-1)
+    return _basis(phase, derivative, smoothness, ((0.0, 0), (1.0, 0), (0.5, 0)))
 
 
 def swing_position(
@@ -81,6 +112,7 @@ def swing_position(
     start_velocity: np.ndarray | None = None,
     end_velocity: np.ndarray | None = None,
     derivative: int = 0,
+    smoothness: int = 2,
 ) -> np.ndarray:
     """Evaluate a swing, or its time derivatives, in the world frame (Paper A, eqs 2–6).
 
@@ -93,6 +125,7 @@ def swing_position(
         start_velocity: ``(3,)`` at lift-off (a wheel's); the vertical part is not used. Default 0.
         end_velocity: ``(3,)`` at touch-down, likewise.
         derivative: 0 position, 1 velocity, 2 acceleration.
+        smoothness: how many derivatives are met at the ends, see :func:`conditions`.
 
     Returns:
         ``(n, 3)``.
@@ -100,7 +133,8 @@ def swing_position(
     start, end = np.asarray(start, float), np.asarray(end, float)
     v0 = np.zeros(3) if start_velocity is None else np.asarray(start_velocity, float)
     vf = np.zeros(3) if end_velocity is None else np.asarray(end_velocity, float)
-    lateral = quintic_basis(phase, derivative) @ np.stack([start, duration * v0, end, duration * vf])
+    given = np.stack([start, duration * v0, end, duration * vf])
+    lateral = quintic_basis(phase, derivative, smoothness) @ given
     apex = 0.5 * (start[2] + end[2]) + apex_height
-    lateral[..., 2] = septic_basis(phase, derivative) @ np.array([start[2], end[2], apex])
+    lateral[..., 2] = septic_basis(phase, derivative, smoothness) @ np.array([start[2], end[2], apex])
     return lateral / duration**derivative

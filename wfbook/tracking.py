@@ -195,19 +195,8 @@ class Tracker:
                 p[leg], v[leg], a[leg] = self._in_the_air(leg, t, ground.normals[leg])
         wheels = self._kinds.astype(bool)
         rpy, omega = self.lean.at(t)
-        ref = Reference(
-            com,
-            velocity,
-            ahead,
-            rotation(rpy),
-            p,
-            v,
-            a,
-            self.stance.copy(),
-            wheels,
-            np.zeros((4, 3)),
-            omega,
-        )
+        stance, forces = self.stance.copy(), np.zeros((4, 3))
+        ref = Reference(com, velocity, ahead, rotation(rpy), p, v, a, stance, wheels, forces, omega)
         return ref, ground
 
     def switches(self, t: float, ends: np.ndarray, present: np.ndarray) -> list[tuple[str, str]]:
@@ -315,9 +304,12 @@ class Tracker:
         count = round(duration / _SAMPLE) + 2
         phase = np.minimum(np.arange(count) * _SAMPLE / duration, 1.0)
         path = np.empty((3, count, 4))
+        smoothness = self.plan.meta.get("swing_smoothness", 2)  # less than 2 only to show what it costs
         for d in range(3):
             basis = quintic_basis(phase, d) / duration**d
-            path[d, :, :3] = swing_position(phase, duration, start, target, apex, velocity, landing, d)
+            path[d, :, :3] = swing_position(
+                phase, duration, start, target, apex, velocity, landing, d, smoothness
+            )
             path[d, :, 2] += duration * landing[2] * basis[:, 3]  # on a slope a wheel lands along the slope
             path[d, :, 3] = basis[:, 2]
         return path

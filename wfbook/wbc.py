@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from wfbook.friction import inner_coefficient
 from wfbook.go1_dynamics import GRAVITY, Go1Dynamics, cross, dot
 from wfbook.qp import QuadraticProgram, Solver
 from wfbook.reference import TICK, Gains, Ground, Reference
@@ -28,8 +29,6 @@ LEG_COLUMNS = 6 + np.arange(12).reshape(4, 3)
 
 _DIRECTIONS = np.array([(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (1, -1), (-1, 1), (-1, -1)], float)
 _SIDES = len(_DIRECTIONS)
-_INSIDE = np.cos(np.pi / _SIDES)
-"""How much nearer the sides of a pyramid inside the cone are than its corners."""
 
 FRICTION_ROWS = _SIDES + 1
 """Sides of a foot's friction pyramid, and the one that says that it pushes."""
@@ -187,7 +186,7 @@ def friction_pyramids(ground: Ground, contact: Contacts, wheels: np.ndarray) -> 
     its motion, so its pyramid is flat there.
     """
     resistance = ground.rolling_resistance * np.tanh(contact.velocity[:, 0] / ROLLING_SPEED)
-    grip = _INSIDE * ground.mu_foot
+    grip = inner_coefficient(ground.mu_foot, _SIDES)
     ahead = np.where(wheels, -resistance, grip)  # the largest λ_t / λ_n
     behind = np.where(wheels, resistance, grip)  # the largest −λ_t / λ_n
     aside = np.where(wheels, ground.mu_wheel_lateral, grip)

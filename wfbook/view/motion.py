@@ -8,6 +8,7 @@ from scipy.interpolate import PchipInterpolator
 
 from wfbook.go1 import RADII, WHEEL_RADIUS
 from wfbook.modes import LEGS
+from wfbook.standing import Standing
 from wfbook.terrain import Terrain
 from wfbook.view.spans import SWINGING, plan_modes
 from wfbook.view.tracks import FPS
@@ -28,7 +29,7 @@ class Motion:
         modes: (N, 4), 0 stands on its foot, 1 on its wheel, 2 swings.
         contact: (N, 4, 3) lowest point of each leg.
         force: (N, 4, 3) contact force on the robot, world frame.
-        planned_com: (N, 3).
+        planned_com: (N, 3); the measured one itself where nobody planned.
         measured_com: (N, 3), or None for a plan that nobody has executed.
         terrain: the ground.
     """
@@ -65,6 +66,24 @@ def motion_of_run(run: "Run") -> Motion:
         planned_com=run.com_ref[at],
         measured_com=run.com[at],
         terrain=run.terrain,
+    )
+
+
+def motion_of_standing(standing: Standing) -> Motion:
+    """Sample a robot that only stands, as a run; it has no plan."""
+    times = np.arange(standing.t[0], standing.t[-1] + 1e-9, 1.0 / FPS)
+    at = np.clip(np.searchsorted(standing.t, times - 1e-9), 0, len(standing.t) - 1)
+    com = standing.com[at]
+    return Motion(
+        start=float(times[0]),
+        qpos=standing.qpos[at],
+        end_effector=standing.end_effector[at],
+        modes=standing.end_effector[at],
+        contact=standing.p[at],
+        force=standing.contact_force[at],
+        planned_com=com,
+        measured_com=com,
+        terrain=standing.terrain,
     )
 
 

@@ -19,9 +19,10 @@ from meshcat import Visualizer
 
 from wfbook.go1 import ASSETS
 from wfbook.modes import LEGS
+from wfbook.standing import Standing
 from wfbook.view import scene
 from wfbook.view.meshcat_static import Recorder, frame, page
-from wfbook.view.motion import Motion, motion_of_plan, motion_of_run
+from wfbook.view.motion import Motion, motion_of_plan, motion_of_run, motion_of_standing
 from wfbook.view.spans import SWINGING, spans
 from wfbook.view.style import FOOT, FORCE, MEASURED, MODE_COLOURS, PLANNED, WHEEL
 from wfbook.view.tracks import Tracks
@@ -36,7 +37,7 @@ _ARROW_LENGTH = 0.5
 _SMALLEST_FORCE = 1.0
 
 
-def html(motion: "Run | Plan", title: str | None = None, beside: str = "") -> str:
+def html(motion: "Run | Plan | Standing", title: str | None = None, beside: str = "") -> str:
     """Return a self-contained page that replays a run or a plan.
 
     Args:
@@ -44,14 +45,16 @@ def html(motion: "Run | Plan", title: str | None = None, beside: str = "") -> st
         title: of the page; by default the terrain's name.
         beside: HTML beside the picture (see :func:`.meshcat_static.page`).
     """
-    shown = motion_of_run(motion) if hasattr(motion, "qpos") else motion_of_plan(motion)
-    legend = {"foot": FOOT, "wheel": WHEEL, "contact force": FORCE, "CoM planned": PLANNED}
+    shown = _motion_of(motion)
+    legend = {"foot": FOOT, "wheel": WHEEL, "contact force": FORCE}
+    if _planned(shown):
+        legend["CoM planned"] = PLANNED
     if shown.measured_com is not None:
         legend["CoM measured"] = MEASURED
     return page(commands(shown), title or f"replay: {shown.terrain.name}", legend, shown.start, beside)
 
 
-def save(motion: "Run | Plan", path: str | os.PathLike, title: str | None = None) -> None:
+def save(motion: "Run | Plan | Standing", path: str | os.PathLike, title: str | None = None) -> None:
     """Write the page that replays a run or a plan.
 
     Raises:
@@ -69,7 +72,7 @@ class Replay:
         beside: HTML beside the picture (see :func:`.meshcat_static.page`).
     """
 
-    def __init__(self, motion: "Run | Plan", height: int = 420, beside: str = "") -> None:
+    def __init__(self, motion: "Run | Plan | Standing", height: int = 420, beside: str = "") -> None:
         self._html = frame(html(motion, beside=beside), height)
 
     def _repr_html_(self) -> str:
@@ -90,11 +93,24 @@ def commands(motion: Motion) -> list[dict]:
     weight = float(model.body_subtreemass[0]) * float(np.linalg.norm(model.opt.gravity))
     _move_arrows(visualizer, tracks, motion, _ARROW_LENGTH / weight)
     _draw_prints(visualizer, motion)
-    scene.add_line(visualizer["com/planned"], motion.planned_com, PLANNED)
+    if _planned(motion):
+        scene.add_line(visualizer["com/planned"], motion.planned_com, PLANNED)
     if motion.measured_com is not None:
         scene.add_line(visualizer["com/measured"], motion.measured_com, MEASURED)
     tracks.play(visualizer)
     return recorder.commands
+
+
+def _motion_of(motion: "Run | Plan | Standing") -> Motion:
+    """Sample whatever moves."""
+    if isinstance(motion, Standing):
+        return motion_of_standing(motion)
+    return motion_of_run(motion) if hasattr(motion, "qpos") else motion_of_plan(motion)
+
+
+def _planned(motion: Motion) -> bool:
+    """Whether the motion had been planned."""
+    return motion.planned_com is not motion.measured_com
 
 
 def _stage(visualizer: Visualizer, tracks: Tracks, motion: Motion) -> None:
