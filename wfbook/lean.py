@@ -11,9 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from wfbook.go1 import nominal
+
 if TYPE_CHECKING:
     from wfbook.planner.plan import Plan
 
+_HIPS = nominal()["hip_offsets"][:, :2] - nominal()["hip_offsets"][:, :2].mean(axis=0)
 _SPLINE = (
     np.array([[1.0, 4.0, 1.0, 0.0], [-3.0, 0.0, 3.0, 0.0], [3.0, -6.0, 3.0, 0.0], [-1.0, 3.0, -3.0, 1.0]]) / 6
 )
@@ -64,7 +67,10 @@ class Lean:
 
 
 def _angles(contacts: np.ndarray) -> tuple[float, float]:
-    """Return roll and pitch of the plane that comes closest to four points ``(4, 3)``."""
-    away = contacts - contacts.mean(axis=0)
-    (rise_x, rise_y), *_ = np.linalg.lstsq(away[:, :2], away[:, 2])
+    """Return roll and pitch at which the hips' heights above contacts ``(4, 3)`` are most alike.
+
+    What counts is where the hips are, not where the contacts: with the legs drawn together at the foot of a
+    ramp, the plane through the contacts is steeper than any ground under them.
+    """
+    (rise_x, rise_y), *_ = np.linalg.lstsq(_HIPS, contacts[:, 2] - contacts[:, 2].mean())
     return np.arcsin(rise_y / np.sqrt(1.0 + rise_x**2 + rise_y**2)), -np.arctan(rise_x)

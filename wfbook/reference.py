@@ -95,7 +95,7 @@ class Gains:
     swing_kp: float = 400.0
     swing_kd: float = 40.0
     com_weight: float = 1000.0
-    attitude_weight: float = 3.0
+    attitude_weight: float = 4.0
     wheel_weight: float = 30.0
     swing_weight: float = 10.0
     contact_damping: float = 40.0

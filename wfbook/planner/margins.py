@@ -8,6 +8,14 @@ for the foot itself, and in front of one for the calf, which slants back.
 **Grip.** A plan may use all friction there is (eqs 26 and 27), and in the corners of the pyramid more. Then
 nothing is left to correct an error with, and the foot slides. At rest there is no choice of when to push:
 there a share of the friction must suffice, whatever it costs.
+
+**Load.** Three legs that stand carry the robot on any point of their triangle, and the cheapest plan takes
+its edge: the third leg stands there and carries nothing. Then the smallest error tips the robot over that
+edge, and nothing that the controller could shift is left. So every leg of three or four keeps some load.
+
+**Knees.** The reach box is drawn along the world's axes. On a slope downwards a foot far ahead of its hip is
+farther ahead still along the ground, and the ground rises towards the knee, which is behind the foot: the
+calf lies down on it. So the body keeps the higher above the ground, the farther ahead a leg stands.
 """
 
 from collections.abc import Iterator
@@ -32,6 +40,17 @@ GRIP = 0.65
 
 HOLD = 0.85
 """Share of the friction coefficients that must be enough to stay at rest."""
+
+LOAD = 0.06
+"""Share of the weight with which each of three legs or more presses on the ground."""
+
+KNEE_RISE = 0.4
+KNEE_HEIGHT = 0.174
+"""How high above a contact's plane the CoM is to be: so much, and a share of the leg's way ahead of its hip.
+
+Where the Go1's knee is 45 mm above the ground less half its calf's thickness, within 5 mm up to
+0.2 m ahead; a wheel lifts the leg's end, and with it the knee, by as much as it takes away below the hip.
+"""
 
 _BEYOND = 2e-3
 _STEP = 5e-3
@@ -63,20 +82,33 @@ def kept_off(problem: Problem, gait: Gait) -> Iterator[Edge]:
                 yield Edge(int(leg), int(slot), a, float(b) - _margin(problem, region, i, a))
 
 
-def kept_in_grip(problem: Problem, gait: Gait) -> Iterator[tuple[int, int, np.ndarray]]:
-    """Yield the sides of smaller friction pyramids: an interval, leg, and ``c`` with ``c · λ ≤ 0``.
+def kept_in_grip(problem: Problem, gait: Gait) -> Iterator[tuple[int, int, np.ndarray, float]]:
+    """Yield smaller friction pyramids, cut off below: an interval, leg, and ``c · λ ≤ most`` in body weights.
 
     Interval K is the rest after the plan, where that ends at rest.
 
     A wheel that rolls over an edge within a slot is taken to be on the region on which it ends.
     """
+    many = (gait.S == 0).sum(axis=0) >= 3
     for leg, slot in np.argwhere(gait.S == 0):
         intervals = list(range(problem.knots_per_slot * slot, problem.knots_per_slot * (slot + 1)))
         if slot == problem.slots - 1 and problem.final_stance:
             intervals.append(problem.knots)
-        for side in _sides(problem, gait, leg, slot, GRIP):
+        sides = [(side, 0.0) for side in _sides(problem, gait, leg, slot, GRIP)]
+        if many[slot]:
+            sides.append((-problem.terrain.regions[int(gait.region[leg, slot])].normal, -LOAD))
+        for side, most in sides:
             for k in intervals:
-                yield k, int(leg), side
+                yield k, int(leg), side, most
+
+
+def kept_off_knees(problem: Problem, gait: Gait) -> Iterator[tuple[int, int, np.ndarray, float]]:
+    """Yield how far ahead legs may stand: an interval, leg, and ``c · (p − x) ≤ most`` in metres."""
+    for leg, slot in np.argwhere(gait.S == 0):
+        region = problem.terrain.regions[int(gait.region[leg, slot])]
+        most = KNEE_RISE * float(problem.robot.stance[leg, 0]) - KNEE_HEIGHT
+        for k in range(problem.knots_per_slot * slot, problem.knots_per_slot * (slot + 1)):
+            yield k, int(leg), KNEE_RISE * region.tangent + region.normal, most
 
 
 def held_at_rest(problem: Problem, gait: Gait) -> Iterator[tuple[int, np.ndarray, float]]:

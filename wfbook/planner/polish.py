@@ -24,7 +24,7 @@ from wfbook.planner.contacts import assignment
 from wfbook.planner.crossings import Crossings, settle
 from wfbook.planner.extract import fill, gait_of, plan_of, problem_of, read
 from wfbook.planner.gait import Gait
-from wfbook.planner.margins import held_at_rest, kept_in_grip, kept_off
+from wfbook.planner.margins import held_at_rest, kept_in_grip, kept_off, kept_off_knees
 from wfbook.planner.plan import Plan
 from wfbook.planner.presolve import solve_fixed
 from wfbook.planner.problem import Problem
@@ -81,9 +81,9 @@ class Polisher:
         self._short = cp.Variable((problem.legs, problem.slots))
         away = float(np.linalg.norm(np.subtract(problem.goal, problem.start)))
         cost += (EDGE_PRICE + 2 * problem.weights.goal * away) * cp.sum(self._short)
-        self._slip = cp.Variable(shape)
-        cost += GRIP_PRICE * cp.sum(self._slip)
-        ties += [self._short >= 0, self._slip >= 0]
+        self._slip, self._low = cp.Variable(shape), cp.Variable(shape)
+        cost += GRIP_PRICE * cp.sum(self._slip) + EDGE_PRICE * cp.sum(self._low)
+        ties += [self._short >= 0, self._slip >= 0, self._low >= 0]
         self._conic = Conic.compile(cost, program.rows(without=("torque", "torque bounds")) + ties)
         self._program_columns = {key: self._conic.columns(v) for key, v in program.discrete.items()}
 
@@ -167,21 +167,26 @@ class Polisher:
         return columns, settled
 
     def _margins(self, gait: Gait) -> tuple[sparse.csc_matrix, np.ndarray]:
-        """Return rows and right-hand sides of the margins, as far as ``_short`` and ``_slip`` allow them."""
+        """Return rows and right-hand sides of the margins, softened by ``_short``, ``_slip`` and ``_low``."""
         problem, conic = self.problem, self._conic
         p = np.stack([conic.columns(c) for c in self.program.p[:2]])
         force = np.stack([conic.columns(v) for v in self._force])
-        short, slip = conic.columns(self._short), conic.columns(self._slip)
+        lever = np.stack([conic.columns(v) for v in self._lever])
+        short, slip, low = (conic.columns(v) for v in (self._short, self._slip, self._low))
         columns, entries, right = [], [], []
         for leg, slot, a, b in kept_off(problem, gait):
             knot = problem.knots_per_slot * (slot + 1)
             columns.append([*p[:, knot, leg], short[leg, slot]])
             entries.append([*a, -1.0])
             right.append(b)
-        for k, leg, c in kept_in_grip(problem, gait):
+        for k, leg, c, most in kept_in_grip(problem, gait):
             columns.append([*force[:, k, leg], slip[k, leg]])
             entries.append([*c, -1.0])
-            right.append(0.0)
+            right.append(most)
+        for k, leg, c, most in kept_off_knees(problem, gait):
+            columns.append([*lever[:, k, leg], low[k, leg]])
+            entries.append([*c, -1.0])
+            right.append(most)
         for leg, c, most in held_at_rest(problem, gait):
             columns.append(force[:, problem.knots, leg])
             entries.append(c)
