@@ -40,7 +40,7 @@ class Wide(Problem):
     @cached_property
     def ground(self) -> GroundMap:
         """As the terrain has it, but for the order of the regions, which the true outlines tell."""
-        return replace(GroundMap.of(self.terrain), order=self.true.ground.order)
+        return replace(super().ground, order=self.true.ground.order)
 
     @property
     def square(self) -> np.ndarray:
@@ -77,6 +77,7 @@ def widened(problem: Problem) -> Wide:
         "terrain": Terrain(problem.terrain.name, regions),
         "limits": replace(limits, speed=(fast, fast), lateral_speed=fast, step=(far, far), force=_STRONGEST),
         "robot": replace(problem.robot, reach=(far, far, far)),
+        "without": tuple(name for name in problem.without if name != "reach"),
         # With all legs in the air there is no centroid.
         "patterns": tuple(p for n in range(problem.legs) for p in combinations(range(problem.legs), n)),
         "stance_between_swings": False,
