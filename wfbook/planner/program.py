@@ -240,18 +240,22 @@ def above_squares(u: Any, pair: tuple[Any, Any], per_leg: bool) -> list[Any]:
 
 def motion_cost(program: Program) -> Any:
     """State eqs 31–33 but for the bounds U± (see :class:`~.problem.Weights`)."""
+    return sum(cost_terms(program).values())
+
+
+def cost_terms(program: Program) -> dict[str, Any]:
+    """State the terms of eqs 31–33 but for the bounds U±, by the name of their weight."""
     w, problem, K = program.problem.priced, program.problem, program.problem.knots
     rise = program.x[2] - problem.robot.height - program.ground
     goal = cp.hstack([program.x[i][K] - problem.goal[i] for i in range(2)])
-    terms = [
-        w.goal * cp.sum_squares(goal),
-        w.goal_angle * sum(cp.square(angle[K]) for angle in program.theta),
-        w.acceleration * sum(cp.sum_squares(a) for a in program.a),
-        w.force * sum(cp.sum_squares(F) for F in program.force),
-        w.centroid * sum(cp.sum_squares(c) for c in program.centroid),
-        w.height * cp.sum_squares(rise[1:]),
-        w.angle * sum(cp.sum_squares(angle[1:]) for angle in program.theta),
-        w.angular_rate * sum(cp.sum_squares(rate[1:]) for rate in program.omega),
-        w.swing * cp.sum(program.S @ problem.slot_numbers),
-    ]
-    return sum(terms)
+    return {
+        "goal": w.goal * cp.sum_squares(goal),
+        "goal_angle": w.goal_angle * sum(cp.square(angle[K]) for angle in program.theta),
+        "acceleration": w.acceleration * sum(cp.sum_squares(a) for a in program.a),
+        "force": w.force * sum(cp.sum_squares(F) for F in program.force),
+        "centroid": w.centroid * sum(cp.sum_squares(c) for c in program.centroid),
+        "height": w.height * cp.sum_squares(rise[1:]),
+        "angle": w.angle * sum(cp.sum_squares(angle[1:]) for angle in program.theta),
+        "angular_rate": w.angular_rate * sum(cp.sum_squares(rate[1:]) for rate in program.omega),
+        "swing": w.swing * cp.sum(program.S @ problem.slot_numbers),
+    }

@@ -28,7 +28,7 @@ class Watched(SCIP):
         """
         super().__init__()
         self.error: BaseException | None = None
-        self._progress, self._offset = progress, offset
+        self._progress, self._offset, self._over = progress, offset, False
         self._begin, self._shown = time.perf_counter(), -np.inf
 
     def _set_params(self, model: Any, *arguments: Any) -> None:
@@ -40,10 +40,17 @@ class Watched(SCIP):
             events = ["NODESOLVED", "LPSOLVED", "ROWADDEDSEPA", "BESTSOLFOUND", "DUALBOUNDIMPROVED"]
             model.attachEventHandlerCallback(self._told, [getattr(SCIP_EVENTTYPE, name) for name in events])
 
+    def _solve(self, *arguments: Any) -> dict[str, Any]:
+        """Solve as CVXPY does. SCIP has events to tell of even while it is taken down: then nobody listens."""
+        try:
+            return super()._solve(*arguments)
+        finally:
+            self._over = True
+
     def _told(self, model: Any, event: Any) -> None:
         """Report; SCIP would print and lose an exception, so it is kept."""
         elapsed = time.perf_counter() - self._begin
-        if self.error is not None or elapsed - self._shown < _SHOWN:
+        if self._over or self.error is not None or elapsed - self._shown < _SHOWN:
             return
         self._shown = elapsed
         try:

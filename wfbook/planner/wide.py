@@ -8,10 +8,10 @@ no limit implies another, and the true limits are stated on top (:mod:`.elastic`
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from itertools import combinations
 
 import numpy as np
 
+from wfbook.modes import swing_patterns
 from wfbook.planner.ground import GroundMap
 from wfbook.planner.problem import Problem
 from wfbook.terrain import Region, Terrain
@@ -79,7 +79,7 @@ def widened(problem: Problem) -> Wide:
         "robot": replace(problem.robot, reach=(far, far, far)),
         "without": tuple(name for name in problem.without if name != "reach"),
         # With all legs in the air there is no centroid.
-        "patterns": tuple(p for n in range(problem.legs) for p in combinations(range(problem.legs), n)),
+        "patterns": swing_patterns(problem.legs - 1),
         "stance_between_swings": False,
         "final_stance": False,
         "beyond_reach": True,
