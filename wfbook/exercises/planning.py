@@ -71,8 +71,8 @@ def conflict(blamed: Iterable[str]) -> str:
     truth = set(found) & set(BLAMED)
     if innocent := sorted(names - truth):
         raise WrongAnswer(
-            f"{', '.join(innocent)}: without {'it' if len(innocent) == 1 else 'them'} there would still be no "
-            "plan; what can be left out of a conflict is not part of it"
+            f"{', '.join(innocent)}: without {'it' if len(innocent) == 1 else 'them'} there would still "
+            "be no plan; what can be left out of a conflict is not part of it"
         )
     if missed := sorted(truth - names):
         hints = {
@@ -89,8 +89,8 @@ def smallest_big_m(function: Callable[..., Any], seed: int = 5) -> str:
     """Check a function that returns the smallest M of an implication.
 
     Args:
-        function: ``function(a, b, low, high)`` returns the least M for which ``a · y ≤ b + M (1 − z)`` says
-            nothing at z = 0, for y anywhere in the box from ``low`` to ``high``.
+        function: ``function(a, b, low, high)`` returns the least M ≥ 0 for which ``a · y ≤ b + M (1 − z)``
+            says nothing at z = 0, for y anywhere in the box from ``low`` to ``high``.
         seed: of the boxes that are tried.
 
     Raises:
@@ -110,6 +110,8 @@ def smallest_big_m(function: Callable[..., Any], seed: int = 5) -> str:
         M = number(called(function, a, b, low, high, name="smallest_m"), "M")
         least = max(float(worst @ a - b), 0.0)
         where = f"a = {a}, b = {b:.2f}, box from {low} to {high}"
+        if M < 0.0:
+            raise WrongAnswer(f"{where}: M = {M:.3f} is negative; a rule that can't be broken needs M = 0")
         if least - 1e-9 > M:
             raise WrongAnswer(
                 f"{where}: M = {M:.3f} is too small. At z = 0 it cuts off y = {worst}, "
@@ -125,8 +127,8 @@ def what_is_left(function: Callable[..., Any], seed: int = 3) -> str:
     """Check the bookkeeping of branch and bound.
 
     Args:
-        function: ``function(bounds, incumbent, gap)`` returns which open nodes must still be searched, ``(n,)``
-            bool, and what is proven: a number that no plan's cost is below.
+        function: ``function(bounds, incumbent, gap)`` returns which open nodes must still be searched,
+            ``(n,)`` bool, and what is proven: a number that no plan's cost is below.
         seed: of the searches that are tried.
 
     Raises:
@@ -135,7 +137,7 @@ def what_is_left(function: Callable[..., Any], seed: int = 3) -> str:
     rng = np.random.default_rng(seed)
     for trial in range(40):
         bounds = rng.uniform(0.2, 1.2, int(rng.integers(1, 8))).round(3)
-        incumbent = np.inf if trial == 0 else float(rng.uniform(0.3, 1.2).round(3))
+        incumbent = np.inf if trial == 0 else round(float(rng.uniform(0.3, 1.2)), 3)
         gap = float(rng.choice([1e-3, 0.05, 0.2]))
         if trial % 5 == 3:
             bounds[rng.integers(len(bounds))] = incumbent * (1 - 0.5 * gap)
@@ -181,8 +183,8 @@ def without_wheels(weight: str) -> str:
         leg, slot = rolls[0]
         raise WrongAnswer(
             f"with {weight} × {FACTOR:g} leg {LEGS[leg]} is on its wheel in slot {slot}; the plan has "
-            f"{int(plan.S.sum())} swings and gets {plan.distance:.2f} m far. A wheel costs nothing; what does "
-            "it take to get one on the ground?"
+            f"{int(plan.S.sum())} swings and gets {plan.distance:.2f} m far. A wheel costs nothing; what "
+            "does it take to get one on the ground?"
         )
     return (
         f"Right: with {weight} × {FACTOR:g} no leg uses its wheel. It makes {int(plan.S.sum())} swings "

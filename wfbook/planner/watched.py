@@ -41,7 +41,7 @@ class Watched(SCIP):
             model.attachEventHandlerCallback(self._told, [getattr(SCIP_EVENTTYPE, name) for name in events])
 
     def _solve(self, *arguments: Any) -> dict[str, Any]:
-        """Solve as CVXPY does. SCIP has events to tell of even while it is taken down: then nobody listens."""
+        """Solve as CVXPY does. SCIP has events even while it is taken down: then nobody listens."""
         try:
             return super()._solve(*arguments)
         finally:

@@ -11,10 +11,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from wfbook.modes import LEGS
-from wfbook.view.style import INK, LIMIT, PALE, PAPER, PLANNED, SWING, Picture, tidy
+from wfbook.view.style import FOOT, INK, LIMIT, PALE, PAPER, PLANNED, SWING, WHEEL, Picture, tidy
 
 if TYPE_CHECKING:
-    from wfbook.planner import Progress
+    from wfbook.planner import Plan, Progress
     from wfbook.planner.textbook import Node
 
 _STYLES = ("-", "--", ":")
@@ -209,3 +209,63 @@ def _scale(axes: Any, traces: Mapping[str, Sequence["Progress"]]) -> None:
         top = min(max(best), min(best) + 1.5 * (min(best) - low) + 0.05 * min(best))
         room = 0.08 * (top - low or top)
         axes.set_ylim(low - room, top + room)
+
+
+def costs(plans: "Mapping[str, Plan]") -> Picture:
+    """Draw what each term of the cost contributes to relaxed plans (Paper A, eqs 31–33).
+
+    Args:
+        plans: by name. Plans that roll are orange, plans that walk are green.
+
+    Returns:
+        A bar for each term and plan, the dearest terms on top; what is next to nothing is left out.
+    """
+    from wfbook.planner.demands import cost_parts
+
+    parts = {name: cost_parts(plan) for name, plan in plans.items()}
+    dearest = {term: max(part[term] for part in parts.values()) for term in next(iter(parts.values()))}
+    terms = sorted((t for t in dearest if dearest[t] > 1e-3 * max(dearest.values())), key=dearest.get)
+    figure = Picture(8.0, 0.9 + 0.45 * len(terms))
+    axes = figure.add_subplot()
+    tidy(axes)
+    axes.grid(axis="y", visible=False)
+    height = 0.8 / len(parts)
+    for i, (name, part) in enumerate(parts.items()):
+        colour = WHEEL if plans[name].end_effector.any() else FOOT
+        places = np.arange(len(terms)) + 0.4 - (i + 0.5) * height
+        label = f"{name}: {sum(part.values()):.3f} in all"
+        axes.barh(places, [part[t] for t in terms], height=0.92 * height, color=colour, label=label, gid=name)
+    axes.set_yticks(range(len(terms)), [term.replace("_", " ") for term in terms])
+    axes.set_xlabel("cost")
+    figure.legend(loc="outside upper center", ncols=len(parts), frameon=False)
+    return figure
+
+
+def sway(relaxed: "Plan", polished: "Plan") -> Picture:
+    """Draw from above how a relaxed plan and its polish move their centres of mass, sideways magnified.
+
+    Args:
+        relaxed: its path is broken.
+        polished: the same gait, whose lines of support are drawn where two legs stand.
+    """
+    figure = Picture(8.0, 3.2)
+    axes = figure.add_subplot()
+    tidy(axes)
+    rho = polished.knots // polished.slots
+    for slot in range(polished.slots):
+        standing = np.flatnonzero(polished.S[:, slot] == 0)
+        if len(standing) == 2:
+            ends = polished.p[slot * rho + rho // 2, standing]
+            label = "line between the two legs that stand"
+            axes.plot(ends[:, 0], 100 * ends[:, 1], color=PALE, lw=1.0, label=label, gid=f"support {slot}")
+    for plan, style, name in ((relaxed, "--", "CoM, relaxed"), (polished, "-", "CoM, polished")):
+        axes.plot(plan.x[:, 0], 100 * plan.x[:, 1], color=PLANNED, ls=style, lw=1.8, label=name, gid=name)
+    most = 100 * max(np.abs(plan.x[:, 1]).max() for plan in (relaxed, polished))
+    axes.set_ylim(-1.4 * most - 1, 1.4 * most + 1)
+    axes.set_xlim(polished.x[0, 0] - 0.05, polished.x[-1, 0] + 0.05)
+    axes.set_xlabel("x, forward (m)")
+    axes.set_ylabel("y, left (cm)")
+    handles, labels = axes.get_legend_handles_labels()
+    once = dict(zip(labels, handles, strict=True))
+    figure.legend(once.values(), once.keys(), loc="outside upper center", ncols=3, frameon=False)
+    return figure
