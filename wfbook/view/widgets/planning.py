@@ -174,7 +174,8 @@ class Conflicts(Searching):
         demands: "Mapping[str, Callable[[Problem], Problem]]" = DEMANDS,
         planner: Planner = plan_for,
     ) -> None:
-        self._problem, self._change = problem, dict(demands)
+        # Too fast a goal is to be told by its reasons, not refused.
+        self._problem, self._change = replace(problem, beyond_reach=True), dict(demands)
         self.demands = {name: switch(name, name in held) for name in demands}
         self.reasons = ipywidgets.HTML()
         super().__init__(list(self.demands.values()), ["gait", "path"], planner)
