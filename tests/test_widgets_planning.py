@@ -97,7 +97,7 @@ def test_the_table_tells_what_leaving_friction_out_buys():
 
 
 def test_a_real_search_is_drawn_while_it_runs(monkeypatch):
-    monkeypatch.setattr(searching, "_REDRAW", 0.0)
+    monkeypatch.setattr(searching, "_REDRAW", 0.1)
     seen = []
     shown = Searching.show
 

@@ -200,7 +200,7 @@ class Conflicts(Searching):
             self._draw_plan(outcome.plan)
         elif outcome.details:
             rows = [
-                (d.group, d.text, ", ".join(d.legs), "" if d.missing is None else f"{d.missing:.2f}")
+                (d.group, d.text, ", ".join(d.legs), "" if d.missing is None else f"{d.missing:.2g}")
                 for d in outcome.details
             ]
             self.reasons.value = table(self.COLUMNS, rows)
