@@ -4,6 +4,9 @@ Written from the paper and the plan file's description only. Every equation the 
 again, one knot and one leg at a time, in the plainest way there is. Lengths and angles are compared in
 metres and radians, accelerations in units of gravity, forces and torques in units of the robot's weight
 (and one metre), so that one tolerance serves all.
+
+A plan may say that groups of constraints were left out (``options.without``). They are not asked of it then,
+and what they put into the cost is not counted; everything else is.
 """
 
 from collections import defaultdict
@@ -133,7 +136,10 @@ def _dynamics(p: Trajectory, ledger: Ledger) -> None:
 
 
 def _angular(p: Trajectory, ledger: Ledger) -> None:
-    """Eq. 9, and in a polished plan eq. 8; the paper's sign of eq. 8 gives the reaction."""
+    """Eq. 9, and in a polished plan eq. 8; the paper's sign of eq. 8 gives the reaction.
+
+    Where the angular bounds are left out, a relaxed plan's rotation owes nothing to its torque.
+    """
     inertia = np.array(p.meta["inertia"])
     s = np.sqrt(p.meta["torque_scale"])
     polished = p.meta["stage"] == "polished"
@@ -141,7 +147,7 @@ def _angular(p: Trajectory, ledger: Ledger) -> None:
     for k in range(p.K):
         needed = inertia @ p.alpha[k]
         claimed = (p.U_plus[k] - p.U_minus[k]).sum(axis=0) / 4
-        if not polished:
+        if not polished and "angular bounds" not in _without(p):
             ledger.add("9 sum", (claimed - needed) / p.weight, knot=k)
         true = np.zeros(3)
         for leg in range(4):
@@ -248,6 +254,10 @@ def _forces(p: Trajectory, ledger: Ledger) -> None:
                 normal = plane.n @ lam
                 resistance = plane.rolling_resistance if kind == WHEEL else 0.0
                 pyramid = plane.friction_excess(lam, kind)
+                if "friction" in _without(p):
+                    pyramid = max(0.0, -normal)  # it still can't pull
+                if "rolling friction" in _without(p):
+                    resistance = 0.0
                 rolling = np.abs(p.f[k, leg] + resistance * normal * plane.t).max()
                 large = max(0.0, normal - p.meta["limits"]["force"] * p.weight)
                 found.append((pyramid, rolling, large))
@@ -263,7 +273,7 @@ def _bodies(p: Trajectory, ledger: Ledger) -> None:
         standing = [leg for leg in range(4) if not p.swings(leg, k)]
         if standing:
             ledger.add("10-15", p.c[k] - sum(p.p[k + 1, leg] for leg in standing) / len(standing), knot=k + 1)
-    for k in range(p.K + 1):
+    for k in range(p.K + 1) if "reach" not in _without(p) else ():
         for leg in range(4):
             r = p.p[k, leg] - p.x[k]
             ledger.add("30", np.maximum(0.0, np.maximum(lower[leg] - r, r - upper[leg])), leg, k)
@@ -345,7 +355,14 @@ def objective(plan: Any) -> float:
         terms["angular_rate"] += np.sum(p.omega[k + 1] ** 2)
     for j in range(p.J):
         terms["swing"] += (before + j + 1) * np.sum(p.S[:, j])
-    return float(sum(w[name] * terms[name] for name in w))
+    left_out = {"angular bounds": "bounds", "centroid": "centroid"}
+    free = {left_out.get(name) for name in _without(p)}
+    return float(sum(w[name] * terms[name] for name in w if name not in free))
+
+
+def _without(p: Trajectory) -> list[str]:
+    """Names of the groups of constraints that were left out."""
+    return p.meta["options"].get("without", [])
 
 
 def _ground(p: Trajectory) -> list[float]:

@@ -9,6 +9,7 @@ its motion is in :mod:`wfbook.leg_path`.
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -25,6 +26,17 @@ Paper A does not say which sets it allows. Two legs of one side or one end leave
 under the centre of mass: such plans solve the relaxed program and fall (measured: a rear-pair swing
 needs 4.5 N m that no force can give).
 """
+
+
+def swing_patterns(most: int) -> tuple[tuple[int, ...], ...]:
+    """Return all sets of legs that may swing together if no more than ``most`` do, the empty one first.
+
+    Raises:
+        ValueError: all legs would be in the air; no centroid is left then (Paper A, eq. 15).
+    """
+    if not 0 <= most < len(LEGS):
+        raise ValueError(f"most: {most!r} is not a number of legs from 0 to {len(LEGS) - 1}")
+    return tuple(legs for n in range(most + 1) for legs in combinations(range(len(LEGS)), n))
 
 
 def end_effector_types(D: np.ndarray) -> np.ndarray:

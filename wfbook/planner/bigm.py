@@ -11,6 +11,7 @@ what eq. 18 implies is the same for every region, it is implied by the sum of D 
 
 import time
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any
@@ -27,6 +28,8 @@ from wfbook.planner.ground import Places, Surface
 from wfbook.planner.plan import Plan
 from wfbook.planner.problem import Problem
 from wfbook.planner.program import Grid, Program, common, within
+from wfbook.planner.tree import Progress
+from wfbook.planner.watched import Watched
 
 
 @dataclass
@@ -315,7 +318,12 @@ def gait_of(program: Program) -> Gait:
     return Gait(S, wheel, np.argmax(occupied, axis=0))
 
 
-def solve(problem: Problem, gap: float, time_limit: float) -> Plan:
+def solve(
+    problem: Problem,
+    gap: float,
+    time_limit: float,
+    progress: Callable[[Progress], None] | None = None,
+) -> Plan:
     """Give the paper's program to SCIP through CVXPY (see :func:`wfbook.planner.solve`)."""
     begin = time.perf_counter()
     check_start(problem)
@@ -324,9 +332,12 @@ def solve(problem: Problem, gap: float, time_limit: float) -> Plan:
     data, chain, inverse = stated.get_problem_data(cp.SCIP)
     built = time.perf_counter() - begin
     options = {"scip_params": {"limits/gap": gap, "limits/time": time_limit}}
-    answer = chain.solve_via_data(stated, data, solver_opts=options)
+    solver = Watched(progress, _offset(inverse))
+    answer = solver.solve_via_data(data, warm_start=False, verbose=False, solver_opts=options)
     spent = time.perf_counter() - begin - built
     model = answer["model"]
+    if solver.error is not None and not isinstance(solver.error, KeyboardInterrupt):
+        raise solver.error
     if model.getNSols() == 0:
         if model.getStatus() == "infeasible":
             raise why_not(problem)

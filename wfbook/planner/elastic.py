@@ -250,7 +250,7 @@ class Elastic:
                     legs = row.shape == (problem.legs,)
                     part = Part(group, kind or ("leg" if legs else "body"))
                     self._give(part, [row], 0 if legs else None, 0 if group == "start" else last)
-        robot = problem.robot
+        robot = problem.body
         for i, (axis, lever) in enumerate(zip("xyz", levers(self._program), strict=True)):
             # The program takes the start as it is; the search asks first whether it is in reach.
             rows = [lever[0] >= robot.reach_lower[:, i] - _SAME, lever[0] <= robot.reach_upper[:, i] + _SAME]

@@ -109,6 +109,7 @@ def describe(problem: Problem) -> dict[str, Any]:
             "final_stance": problem.final_stance,
             "beyond_reach": problem.beyond_reach,
             "goal_tolerance": problem.goal_tolerance and list(map(float, problem.goal_tolerance)),
+            "without": list(problem.without),
         },
     }
 
@@ -140,6 +141,7 @@ def problem_of(plan: Plan) -> Problem:
         options = meta["options"] | {"patterns": tuple(map(tuple, meta["options"]["patterns"]))}
         if options.get("goal_tolerance"):
             options["goal_tolerance"] = tuple(options["goal_tolerance"])
+        options["without"] = tuple(options.get("without", ()))
         return Problem(
             plan.terrain,
             goal=tuple(meta["goal"]),

@@ -161,7 +161,7 @@ class Places:
             problem: what is asked.
             bounds: of the centre of mass.
         """
-        ground, robot = problem.ground, problem.robot
+        ground, robot = problem.ground, problem.body
         low = bounds.place[0][:, None] + robot.reach_lower[:, :2].T[..., None]
         high = bounds.place[1][:, None] + robot.reach_upper[:, :2].T[..., None]
         corners = [region.vertices[:, :2] for region in ground.regions]

@@ -14,6 +14,17 @@ from wfbook.terrain import Terrain
 
 _SAME = 1e-9  # what rounding may leave between two ways of saying the same place
 _ON_GROUND = 1e-6  # how far a solver may leave a contact from the ground it stands on
+_GRIP = 10.0  # a coefficient of friction that no motion within the limits makes use of
+
+OPTIONAL = {
+    "friction": "contacts hold whatever the direction of their force; a wheel pushes as a foot does",
+    "rolling friction": "wheels roll for ever",
+    "reach": "legs are as long as they need to be",
+    "angular bounds": "the robot can't turn over, whatever torque its forces make",
+    "centroid": "the centre of mass may stray from the middle of the contacts",
+}
+"""Groups of constraints that a problem may do without, and what is true then (Paper A, eqs 26 and 27; 28
+and 29; 30; 8 and 9 with their terms of eq. 33; 10 to 15, which serve a term of eq. 33 only)."""
 
 
 @dataclass(frozen=True)
@@ -123,6 +134,8 @@ class Problem:
         final_stance: all legs stand in the last slot, at rest, one of them on a foot.
         beyond_reach: accept a goal farther than top speed can bring the robot (section IV-B does).
         goal_tolerance: how far from the goal the centre of mass may end, along x and y; default: anywhere.
+        without: names of :data:`OPTIONAL`: groups of constraints that are left out. A plan without one of
+            them is for study; no robot can be expected to execute it.
         robot: mass, inertia and reach boxes.
         weights: of the cost.
         limits: of motion and force.
@@ -146,6 +159,7 @@ class Problem:
     final_stance: bool = True
     beyond_reach: bool = False
     goal_tolerance: tuple[float, float] | None = None
+    without: Sequence[str] = ()
     robot: Robot = field(default_factory=Robot.go1)
     weights: Weights = field(default_factory=Weights)
     limits: Limits = field(default_factory=Limits)
@@ -180,6 +194,8 @@ class Problem:
             raise ValueError(
                 f"patterns: {self.patterns!r}, expected sets of legs 0 to 3, the empty one among them"
             )
+        if isinstance(self.without, str) or not set(self.without) <= set(OPTIONAL):
+            raise ValueError(f"without: {self.without!r}, expected names of {', '.join(OPTIONAL)}")
         self._check_goal()
         if self.initial is not None:
             self._check_initial(self.initial)
@@ -216,7 +232,35 @@ class Problem:
     @cached_property
     def ground(self) -> GroundMap:
         """The terrain as the program sees it."""
-        return GroundMap.of(self.terrain)
+        changes: dict[str, float] = {}
+        if "friction" in self.without:
+            changes |= dict.fromkeys(("mu_foot", "mu_wheel", "mu_wheel_lateral"), _GRIP)
+        if "rolling friction" in self.without:
+            changes["rolling_resistance"] = 0.0
+        regions = tuple(replace(region, **changes) for region in self.terrain.regions)
+        return GroundMap.of(replace(self.terrain, regions=regions) if changes else self.terrain)
+
+    @cached_property
+    def body(self) -> Robot:
+        """The robot as the program sees it: without reach its boxes are as large as any plan could use."""
+        if "reach" not in self.without:
+            return self.robot
+        limits = self.limits
+        fastest = max(*limits.speed, limits.lateral_speed)
+        offset = np.abs(self.start_state.contacts - self.start_state.position).max()
+        far = float(offset + fastest * self.duration + max(limits.step) * self.slots)
+        return replace(self.robot, reach=(far, far, far))
+
+    @property
+    def priced(self) -> Weights:
+        """The weights as the program sees them: what is left out costs nothing."""
+        terms = {"angular bounds": "bounds", "centroid": "centroid"}
+        return replace(self.weights, **{terms[name]: 0.0 for name in self.without if name in terms})
+
+    @property
+    def turns(self) -> bool:
+        """Whether torque turns the robot (eqs 8 and 9)."""
+        return "angular bounds" not in self.without
 
     @property
     def legs(self) -> int:
@@ -311,7 +355,7 @@ class Problem:
         """Whether every leg has ground under it at time 0, within its reach box (eq. 30)."""
         if (self.start_regions < 0).any():
             return False
-        state, robot = self.start_state, self.robot
+        state, robot = self.start_state, self.body
         lever = state.contacts - state.position
         above = (lever >= robot.reach_lower - _ON_GROUND).all()
         return bool(above and (lever <= robot.reach_upper + _ON_GROUND).all())

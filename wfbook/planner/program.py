@@ -134,6 +134,8 @@ def common(
     p = [cp.Variable((K + 1, L), name=f"p{i}") for i in range(3)]
     bounds = [[cp.Variable((K, L) if per_leg else K, name=f"U{sign}{i}") for i in range(3)] for sign in "+-"]
     total = [[cp.sum(u, axis=1) if per_leg else u for u in side] for side in bounds]
+    if not problem.turns:
+        total = [[np.zeros(K)] * 3] * 2
     centroid = [cp.Variable(K, name=f"c{i}") for i in range(2)]
     level, swing_height = problem.ground.level, problem.robot.swing_height
     if level is None:
@@ -147,20 +149,20 @@ def common(
     newton = linear_dynamics(a, force, friction, mass=1.0 / GRAVITY)
     program.add("dynamics", *(r == 0 for r in newton + midpoint_integration(x, v, a, dt)))
     inertia = problem.robot.inertia / problem.robot.weight
-    for i in range(3):
+    for i in range(3) if problem.turns else ():
         torque = sum(inertia[i, j] * alpha[j] for j in range(3) if inertia[i, j])
         program.add("torque", torque == 0.25 * (total[0][i] - total[1][i]))
     program.add("rotation", *(r == 0 for r in midpoint_integration(theta, omega, alpha, dt)))
 
     middle = program.lever = [0.5 * (r[1:] + r[:-1]) for r in levers(program)]
-    for side, terms in zip(bounds, bound_terms(middle, force), strict=True):
+    for side, terms in zip(bounds, bound_terms(middle, force), strict=True) if problem.turns else ():
         for u, pair in zip(side, terms, strict=True):
             program.add("torque bounds", *above_squares(u, pair, per_leg))
 
     bound(program, problem)
-    program.cost = motion_cost(program) + problem.weights.bounds * sum(
-        cp.sum(U) for U in (*total[0], *total[1])
-    )
+    program.cost = motion_cost(program)
+    if problem.turns:
+        program.cost += problem.weights.bounds * sum(cp.sum(U) for U in (*total[0], *total[1]))
     return program
 
 
@@ -175,7 +177,7 @@ def bound(program: Program, problem: Problem) -> None:
     """
     x, v, p, theta, omega = program.x, program.v, program.p, program.theta, program.omega
     K, lever = problem.knots, levers(program)
-    robot, limits = problem.robot, problem.limits
+    robot, limits = problem.body, problem.limits
     ones = np.ones((K, 1))
     for i, axis in enumerate("xyz"):  # the start is as it is
         low, high = ones * robot.reach_lower[:, i], ones * robot.reach_upper[:, i]
@@ -238,18 +240,22 @@ def above_squares(u: Any, pair: tuple[Any, Any], per_leg: bool) -> list[Any]:
 
 def motion_cost(program: Program) -> Any:
     """State eqs 31–33 but for the bounds U± (see :class:`~.problem.Weights`)."""
-    w, problem, K = program.problem.weights, program.problem, program.problem.knots
+    return sum(cost_terms(program).values())
+
+
+def cost_terms(program: Program) -> dict[str, Any]:
+    """State the terms of eqs 31–33 but for the bounds U±, by the name of their weight."""
+    w, problem, K = program.problem.priced, program.problem, program.problem.knots
     rise = program.x[2] - problem.robot.height - program.ground
     goal = cp.hstack([program.x[i][K] - problem.goal[i] for i in range(2)])
-    terms = [
-        w.goal * cp.sum_squares(goal),
-        w.goal_angle * sum(cp.square(angle[K]) for angle in program.theta),
-        w.acceleration * sum(cp.sum_squares(a) for a in program.a),
-        w.force * sum(cp.sum_squares(F) for F in program.force),
-        w.centroid * sum(cp.sum_squares(c) for c in program.centroid),
-        w.height * cp.sum_squares(rise[1:]),
-        w.angle * sum(cp.sum_squares(angle[1:]) for angle in program.theta),
-        w.angular_rate * sum(cp.sum_squares(rate[1:]) for rate in program.omega),
-        w.swing * cp.sum(program.S @ problem.slot_numbers),
-    ]
-    return sum(terms)
+    return {
+        "goal": w.goal * cp.sum_squares(goal),
+        "goal_angle": w.goal_angle * sum(cp.square(angle[K]) for angle in program.theta),
+        "acceleration": w.acceleration * sum(cp.sum_squares(a) for a in program.a),
+        "force": w.force * sum(cp.sum_squares(F) for F in program.force),
+        "centroid": w.centroid * sum(cp.sum_squares(c) for c in program.centroid),
+        "height": w.height * cp.sum_squares(rise[1:]),
+        "angle": w.angle * sum(cp.sum_squares(angle[1:]) for angle in program.theta),
+        "angular_rate": w.angular_rate * sum(cp.sum_squares(rate[1:]) for rate in program.omega),
+        "swing": w.swing * cp.sum(program.S @ problem.slot_numbers),
+    }

@@ -55,7 +55,7 @@ def build(problem: Problem, bounds: MotionBounds) -> Relaxation:
         bounds: of the centre of mass; if they hold for plans below some cost only, so does the QP.
     """
     J, K, dt = problem.slots, problem.knots, problem.dt
-    w, robot, limits, ground = problem.weights, problem.robot, problem.limits, problem.ground
+    w, robot, limits, ground = problem.priced, problem.body, problem.limits, problem.ground
     places = Places.of(problem, bounds)
     contacts = Contacts.of(problem, places, inner_knots=False)
     S = contacts.S
@@ -100,7 +100,7 @@ def _forces(contacts: Contacts, a: list[Any]) -> tuple[Any, list[Any]]:
     problem, sizes = contacts.problem, contacts.sizes
     K, L = problem.knots, problem.legs
     spread = Grid.of(problem).spread
-    weight, most = problem.weights.force + 4 * problem.weights.bounds, problem.limits.force
+    weight, most = problem.priced.force + 4 * problem.priced.bounds, problem.limits.force
     counts = L - np.arange(sizes.shape[0])
     chosen = spread @ sizes.T
     # The variable is what is squared, for CVXPY gives the square of anything else a variable of its own.
@@ -214,7 +214,7 @@ def _heights(contacts: Contacts, shares: dict, z: Any) -> tuple[Any, list[Any]]:
     Returns:
         The cost, and constraints.
     """
-    problem, w, robot, heights = contacts.problem, contacts.problem.weights, contacts.problem.robot, 0
+    problem, w, robot, heights = contacts.problem, contacts.problem.priced, contacts.problem.body, 0
     J, K, L, rho, grid = problem.slots, problem.knots, problem.legs, problem.knots_per_slot, Grid.of(problem)
     for r in contacts.regions:
         *slopes, constant = problem.ground.planes[r]
@@ -256,7 +256,7 @@ def _levers(
     """Bound the horizontal cost of levers and centroid; state eqs 19–22 and 30 at slot ends."""
     problem, S, sizes = contacts.problem, contacts.S, contacts.sizes
     J, K, L, rho = problem.slots, problem.knots, problem.legs, problem.knots_per_slot
-    w, robot, limits = problem.weights, problem.robot, problem.limits
+    w, robot, limits = problem.priced, problem.body, problem.limits
     ones, legs = np.ones((1, J)), np.ones((L, 1))
     grid = Grid.of(problem)
     mean = np.kron(np.eye(J), np.full((1, rho), 1.0 / rho))
@@ -335,4 +335,4 @@ def _vertical_levers(problem: Problem, z: Any, sizes: Any) -> Any:
     above = 0.5 * (z[1:] + z[:-1]) - problem.ground.level
     root = np.sqrt(L)
     mixed = cp.sum_squares(root * above - cp.multiply(h, swinging) / root)
-    return 4 * problem.weights.bounds * (mixed + cp.sum(cp.multiply(h**2, swinging - square / L)))
+    return 4 * problem.priced.bounds * (mixed + cp.sum(cp.multiply(h**2, swinging - square / L)))

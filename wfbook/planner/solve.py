@@ -35,7 +35,7 @@ def solve(
             big-M program given to SCIP as it is. Both have the same feasible set.
         gap: relative gap ``(objective − bound) / objective`` at which the search ends.
         time_limit: of the search, in seconds.
-        progress: called now and then while the tight formulation is searched.
+        progress: called now and then.
 
     Returns:
         The relaxed plan. ``meta`` holds objective, bound, gap, nodes, status ("optimal", "time limit",
@@ -52,7 +52,7 @@ def solve(
         raise ValueError(f"formulation: {formulation!r}, expected one of {FORMULATIONS}")
     check_limits(gap, time_limit)
     if formulation == "paper":
-        return bigm.solve(problem, gap, time_limit)
+        return bigm.solve(problem, gap, time_limit, progress)
     with contextlib.closing(Search(problem, gap, time_limit, progress)) as search:
         return search.run()
 
@@ -85,7 +85,7 @@ def solve_executable(
     check_start(problem)
     polisher = Polisher(problem)
     if formulation == "paper":
-        relaxed = solve(problem, formulation, gap, time_limit)
+        relaxed = solve(problem, formulation, gap, time_limit, progress)
         polished = polisher.polish(relaxed)
         if not repaired(polished):
             raise NoPlanError(

@@ -78,7 +78,7 @@ def mccormick(binary: Any, factor: Any, low: Any, high: Any) -> tuple[Any, list[
 
 def centroid_bounds(problem: Problem, n: int, axis: int) -> tuple[float, float]:
     """Return the range of the mean lever of the standing legs while ``n`` legs swing."""
-    lower, upper = problem.robot.reach_lower[:, axis], problem.robot.reach_upper[:, axis]
+    lower, upper = problem.body.reach_lower[:, axis], problem.body.reach_upper[:, axis]
     standing = [[leg for leg in range(problem.legs) if leg not in p] for p in problem.patterns if len(p) == n]
     return min(lower[s].mean() for s in standing), max(upper[s].mean() for s in standing)
 
@@ -258,7 +258,7 @@ def _centroid(program: Program, contacts: Contacts, grid: Grid) -> None:
     swing = grid.spread @ program.S.T
     ones = np.ones((1, L))
     for i in range(2):
-        lower, upper = problem.robot.reach_lower[:, i], problem.robot.reach_upper[:, i]
+        lower, upper = problem.body.reach_lower[:, i], problem.body.reach_upper[:, i]
         lever = program.p[i][1:] - cp.reshape(program.x[i][1:], (K, 1), order="C") @ ones
         vertex = cp.Variable((K, L), name=f"vertex{i}")
         program.add(

@@ -8,10 +8,10 @@ no limit implies another, and the true limits are stated on top (:mod:`.elastic`
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
-from itertools import combinations
 
 import numpy as np
 
+from wfbook.modes import swing_patterns
 from wfbook.planner.ground import GroundMap
 from wfbook.planner.problem import Problem
 from wfbook.terrain import Region, Terrain
@@ -40,7 +40,7 @@ class Wide(Problem):
     @cached_property
     def ground(self) -> GroundMap:
         """As the terrain has it, but for the order of the regions, which the true outlines tell."""
-        return replace(GroundMap.of(self.terrain), order=self.true.ground.order)
+        return replace(super().ground, order=self.true.ground.order)
 
     @property
     def square(self) -> np.ndarray:
@@ -77,8 +77,9 @@ def widened(problem: Problem) -> Wide:
         "terrain": Terrain(problem.terrain.name, regions),
         "limits": replace(limits, speed=(fast, fast), lateral_speed=fast, step=(far, far), force=_STRONGEST),
         "robot": replace(problem.robot, reach=(far, far, far)),
+        "without": tuple(name for name in problem.without if name != "reach"),
         # With all legs in the air there is no centroid.
-        "patterns": tuple(p for n in range(problem.legs) for p in combinations(range(problem.legs), n)),
+        "patterns": swing_patterns(problem.legs - 1),
         "stance_between_swings": False,
         "final_stance": False,
         "beyond_reach": True,

@@ -250,7 +250,7 @@ def state_after(problem: Problem, plan: Plan, slots: int) -> InitialState:
 
     Solvers leave limits exceeded by their tolerance, which a start may not: it is moved back inside.
     """
-    k, robot, limits = slots * problem.knots_per_slot, problem.robot, problem.limits
+    k, robot, limits = slots * problem.knots_per_slot, problem.body, problem.limits
     low = [-limits.speed[1], -limits.lateral_speed, -limits.lateral_speed]
     high = [limits.speed[0], limits.lateral_speed, limits.lateral_speed]
     contacts = np.clip(plan.p[k], plan.x[k] + robot.reach_lower, plan.x[k] + robot.reach_upper)
