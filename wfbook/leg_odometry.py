@@ -15,7 +15,7 @@ from typing import Self
 import numpy as np
 import pinocchio as pin
 
-from wfbook.go1 import FOOT_RADIUS, WHEEL_RADIUS
+from wfbook.go1 import FOOT_RADIUS, IMU_POSITION, WHEEL_RADIUS, leg_kinematics
 from wfbook.go1_dynamics import GRAVITY, WHEEL_FLATNESS, contact_offsets, cross, dot, skew
 from wfbook.sensors import Reading
 
@@ -197,3 +197,24 @@ def expected_ends(state: BaseState, printed: np.ndarray) -> tuple[np.ndarray, np
         H[printed, 0, VELOCITY] -= R_bw[0]
         H[printed, 0, TURN] -= R_bw[0] @ skew(state.v)
     return ends, H
+
+
+def leg_velocities(reading: Reading, R_wb: np.ndarray, rolling: Rolling) -> np.ndarray:
+    """Return the velocity of the inertial unit that each leg measures if it stands.
+
+    A leg's end moves with ``ω × r n`` in the world, and with ``J q̇ + ω_b × e`` relative to the inertial unit;
+    the difference is how the inertial unit moves.
+
+    Args:
+        reading: of encoders and gyro.
+        R_wb: ``(3, 3)`` orientation of the trunk.
+        rolling: what the legs' ends do.
+
+    Returns:
+        ``(4, 3)`` in the world.
+    """
+    ends, jacobians, _ = leg_kinematics(reading.joint_angles)
+    stick = (jacobians @ reading.joint_rates[:, :, None])[:, :, 0]
+    stick += cross(reading.gyro, ends - IMU_POSITION)
+    lever, _ = rolling.levers(R_wb)
+    return cross((reading.gyro + rolling.spin) @ R_wb.T, lever) - stick @ R_wb.T
