@@ -62,6 +62,17 @@ class BaseState:
             self.p + error[ENDS].reshape(4, 3),
         )
 
+    def moved(self, shift: np.ndarray, turn: np.ndarray) -> Self:
+        """Return the state of the same robot elsewhere: turned about the origin, then shifted.
+
+        Args:
+            shift: ``(3,)`` in the world.
+            turn: ``(3,)`` rotation vector in the world.
+        """
+        R = pin.exp3(np.asarray(turn, float))
+        moved = self.r @ R.T + shift, self.v @ R.T, R @ self.R_wb
+        return type(self)(*moved, self.accelerometer_bias, self.gyro_bias, self.p @ R.T + shift)
+
     def minus(self, other: Self) -> np.ndarray:
         """Return the error ``(27,)`` with ``other.plus(error)`` being this state."""
         return np.concatenate(

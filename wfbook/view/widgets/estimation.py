@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import ipywidgets
 import numpy as np
 
-from wfbook import kalman
+from wfbook import kalman, simulate
 from wfbook.estimator import WHEEL_MODELS, Tuning
 from wfbook.go1 import FOOT_RADIUS, WHEEL_RADIUS
 from wfbook.leg_odometry import Rolling
@@ -17,6 +17,7 @@ from wfbook.view.style import ESTIMATED, FOOT, MEASURED, PALE, WHEEL, Picture, t
 from wfbook.view.widgets.panel import Panel
 
 if TYPE_CHECKING:
+    from wfbook.planner import Plan
     from wfbook.simulate import Run
 
 _WIDE = {"description_width": "initial"}
@@ -149,7 +150,7 @@ class FilterBench(Panel):
     A run is recorded once and filtered again for every choice; answers are kept.
 
     Args:
-        runs: by name, simulated runs.
+        runs: by name, simulated runs, or plans: those are simulated when they are first chosen.
 
     Attributes:
         terrain: which run.
@@ -163,7 +164,7 @@ class FilterBench(Panel):
 
     NO_LEGS = "no legs"
 
-    def __init__(self, runs: "Mapping[str, Run]") -> None:
+    def __init__(self, runs: "Mapping[str, Run | Plan]") -> None:
         self._runs = dict(runs)
         self._recordings: dict[tuple, Recording] = {}
         self._estimates: dict[tuple, Estimate] = {}
@@ -215,5 +216,8 @@ class FilterBench(Panel):
         """Return the readings of a run, recorded when first asked for."""
         key = name, worse, seed
         if key not in self._recordings:
+            if not hasattr(self._runs[name], "qpos"):
+                self.say("simulating …")
+                self._runs[name] = simulate.run(self._runs[name])
             self._recordings[key] = record(self._runs[name], seed, SensorNoise().scaled(worse))
         return self._recordings[key]
