@@ -242,10 +242,10 @@ def honest_noise(sigma_a: Any) -> str:
         )
     if above > below:
         raise WrongAnswer(
-            f"sigma_a = {sigma_a:g}: the mean NEES is {nees.mean():.2f}, above {high:.2f} {100 * above:.0f} % "
-            f"of the time. The filter is too sure of itself: it believes the accelerometer more than it should"
+            f"sigma_a = {sigma_a:g}: mean NEES {nees.mean():.2f}, above {high:.2f} {100 * above:.0f} % "
+            f"of the time. The filter is too sure of itself: it trusts the accelerometer more than it should"
         )
     raise WrongAnswer(
-        f"sigma_a = {sigma_a:g}: the mean NEES is {nees.mean():.2f}, below {low:.2f} {100 * below:.0f} % of "
+        f"sigma_a = {sigma_a:g}: mean NEES {nees.mean():.2f}, below {low:.2f} {100 * below:.0f} % of "
         f"the time. The filter is too shy: its errors are smaller than it says"
     )
