@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import estimation_cases
 import handmade
 import mujoco
 import numpy as np
@@ -26,15 +27,14 @@ DT = 0.002
 UP = np.tile([0.0, 0.0, 1.0], (4, 1))
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def walk():
-    return run(handmade.trot(0.4, 7), hold=0.2)
+    return estimation_cases.walk()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def coast():
-    """Speeds up on feet, rolls on four wheels for 1.2 s, brakes with one foot."""
-    return run(handmade.coast(), hold=0.2)
+    return estimation_cases.coast()
 
 
 def quality(result, wheel_model: str, seed: int) -> tuple[float, float]:

@@ -8,6 +8,7 @@ import pinocchio as pin
 
 from wfbook import ideal, kalman
 from wfbook.exercises.answer import WrongAnswer, array, called, number
+from wfbook.go1 import FOOT_RADIUS
 from wfbook.go1_dynamics import cross
 from wfbook.recording import odometry
 
@@ -43,33 +44,35 @@ def printed_speed(guess: Any) -> str:
     raise WrongAnswer(f"the filter does not believe in {guess:.2f} m/s; {why}")
 
 
-def forgotten_rolling(recording: "Recording", percent: Any) -> str:
+def forgotten_rolling(recording: "Recording", percent: Any, radius: float = FOOT_RADIUS) -> str:
     """Check by how much legs are off that forget that feet are round.
 
     Args:
         recording: of a walk on feet.
         percent: of the way, positive if the robot believes that it got farther than it did.
+        radius: of the feet, m; what is forgotten grows with it.
 
     Raises:
-        WrongAnswer: the sign is wrong, or it is not within half and twice the truth.
+        WrongAnswer: the sign is wrong, or it is off by more than two fifths.
     """
     percent = number(percent, "percent")
     start = int(np.searchsorted(recording.t, 0.0))
-    true = recording.path[-1, 0] - recording.path[start, 0]
-    path, _ = odometry(recording, rolling=False)
-    off = 100.0 * float((path[-1, 0] - path[start, 0]) / true - 1.0)
+    resting, rolling = (odometry(recording, rolls)[0] for rolls in (False, True))
+    way = rolling[-1, 0] - rolling[start, 0]
+    forgotten = resting[-1, 0] - resting[start, 0] - way
+    off = 100.0 * float(forgotten / way) * radius / FOOT_RADIUS
     if percent * off <= 0.0:
         raise WrongAnswer(
             f"percent = {percent:g} has the wrong sign: the calf tips forwards while the trunk passes over "
             f"the foot, so the middle of the foot rolls forwards, and who thinks it rests leaves that out"
         )
-    if not 0.5 <= percent / off <= 2.0:
-        size = "large" if percent / off > 2.0 else "small"
+    if not 0.6 <= percent / off <= 1.4:
+        size = "large" if percent / off > 1.4 else "small"
         raise WrongAnswer(
             f"percent = {percent:g} is too {size}: a foot of radius r rolls r Δ while the calf turns by Δ, "
             f"and the leg carries the trunk about h Δ ahead, with h the height of the hip"
         )
-    return f"Right: {off:.1f} % of {true:.2f} m."
+    return f"Right: {off:.1f} % of the way."
 
 
 def kalman_step(function: Callable[..., Any]) -> str:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Ellipse, FancyBboxPatch, Patch
+from matplotlib.ticker import NullLocator
 from scipy.stats import chi2
 
 from wfbook.view.spans import spans
@@ -283,6 +284,9 @@ def draw_consistency(
     axes.plot(t, mean, color=MEASURED, linewidth=1.3, label="mean NEES", gid="nees")
     axes.set_xlim(t[0], t[-1])
     axes.set_yscale("log")
+    axes.set_yticks([states * factor for factor in (0.2, 0.5, 1, 2, 5, 10, 100, 1000)])
+    axes.yaxis.set_major_formatter("{x:g}")
+    axes.yaxis.set_minor_locator(NullLocator())
     axes.set_ylim(min(0.3 * bounds[0], 0.8 * mean.min()), max(3.0 * bounds[1], 1.3 * mean.max()))
     axes.set_xlabel("time (s)")
     axes.set_ylabel(f"mean NEES of {len(values)} runs")
