@@ -41,7 +41,7 @@ class CartFilter(Panel):
 
     def __init__(self) -> None:
         factors = {"base": 2.0, "min": -4.0, "max": 4.0, "step": 0.5, "value": 1.0, "style": _WIDE}
-        layout = ipywidgets.Layout(width="330px")
+        layout = ipywidgets.Layout(width="470px")
         self.felt, self.measured = (
             ipywidgets.FloatLogSlider(
                 description=f"noise it assumes: {name} ×",
@@ -113,7 +113,14 @@ class RollingEnd(Panel):
         self.end = ipywidgets.ToggleButtons(options=("foot", "wheel"))
         self.calf, self.wheel = (
             ipywidgets.FloatSlider(
-                value=value, min=-60, max=60, step=1, description=name, readout_format=".0f", style=_WIDE
+                value=value,
+                min=-60,
+                max=60,
+                step=1,
+                description=name,
+                readout_format=".0f",
+                style=_WIDE,
+                layout=ipywidgets.Layout(width="380px"),
             )
             for name, value in (("calf turns (°)", 30.0), ("wheel on its axle (°)", 0.0))
         )
@@ -175,7 +182,11 @@ class FilterBench(Panel):
             options=[*options, ("no legs, IMU alone", self.NO_LEGS)], description="wheels", style=_WIDE
         )
         self.worse = ipywidgets.SelectionSlider(
-            options=(0.25, 0.5, 1.0, 2.0, 4.0, 8.0), value=1.0, description="sensors worse ×", style=_WIDE
+            options=(0.25, 0.5, 1.0, 2.0, 4.0, 8.0),
+            value=1.0,
+            description="sensors worse ×",
+            style=_WIDE,
+            layout=ipywidgets.Layout(width="340px"),
         )
         self.informed = ipywidgets.Checkbox(value=True, description="and the filter knows", indent=False)
         self.luck = ipywidgets.IntSlider(value=1, min=0, max=9, description="luck", continuous_update=False)
