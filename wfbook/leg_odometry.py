@@ -210,6 +210,23 @@ def expected_ends(state: BaseState, printed: np.ndarray) -> tuple[np.ndarray, np
     return ends, H
 
 
+def spins(reading: Reading, turning: np.ndarray, counted: np.ndarray) -> np.ndarray:
+    """Return the angular velocities of what rolls below each leg, relative to the trunk and in its frame.
+
+    Args:
+        reading: of the encoders.
+        turning: ``(4, 3, 3)`` Jacobians of the calves' angular velocities; their last columns are the axles.
+        counted: ``(4,)`` bool, legs whose wheel turns on its axle, too, and has an encoder there.
+
+    Returns:
+        ``(4, 3)``
+    """
+    calves = (turning @ reading.joint_rates[:, :, None])[:, :, 0]
+    if not counted.any():
+        return calves
+    return calves + (counted * reading.wheel_rates)[:, None] * turning[:, :, 2]
+
+
 def leg_velocities(reading: Reading, R_wb: np.ndarray, rolling: Rolling) -> np.ndarray:
     """Return the velocity of the inertial unit that each leg measures if it stands.
 

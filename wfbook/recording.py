@@ -14,7 +14,7 @@ import pinocchio as pin
 from wfbook.estimator import TOUCH, Estimator, Tuning
 from wfbook.go1 import IMU_POSITION, leg_kinematics
 from wfbook.kalman import nees
-from wfbook.leg_odometry import POSITION, VELOCITY, BaseState, Rolling, leg_velocities
+from wfbook.leg_odometry import POSITION, VELOCITY, BaseState, Rolling, leg_velocities, spins
 from wfbook.sensors import Reading, SensorNoise, Sensors, imu_motion
 
 if TYPE_CHECKING:
@@ -221,10 +221,8 @@ def odometry(recording: Recording, rolling: bool = True) -> tuple[np.ndarray, np
         R_wb = R_wb @ pin.exp3(dt * reading.gyro)
         standing, wheels = recording.touching[k], recording.wheels[k]
         _, _, turning = leg_kinematics(reading.joint_angles)
-        spin = (turning @ reading.joint_rates[:, :, None])[:, :, 0]
-        axles = turning[:, :, 2]
-        spin = spin + np.where(wheels, reading.wheel_rates, 0.0)[:, None] * axles
-        model = Rolling(spin, axles, recording.normals[k], wheels, standing & rolling)
+        spin = spins(reading, turning, wheels)
+        model = Rolling(spin, turning[:, :, 2], recording.normals[k], wheels, standing & rolling)
         if standing.any():
             v = leg_velocities(reading, R_wb, model)[standing].mean(axis=0)
         r = r + dt * v
