@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import estimation_cases
 import handmade
 import mujoco
 import numpy as np
@@ -9,10 +10,14 @@ import pinocchio as pin
 import pytest
 
 from wfbook import estimator as filters
-from wfbook.estimator import WHEEL_MODELS, Estimator, Tuning, replay
+from wfbook.estimator import WHEEL_MODELS, Estimator, Tuning
 from wfbook.go1 import IMU_POSITION, Go1, leg_angles, leg_kinematics, nominal
 from wfbook.go1_dynamics import GRAVITY
+from wfbook.ideal import coast as coast_on
+from wfbook.ideal import sway
+from wfbook.kalman import nees, nees_bounds
 from wfbook.leg_odometry import STATES, BaseState, Rolling, expected_ends, propagate
+from wfbook.recording import estimate, record
 from wfbook.sensors import Reading, SensorNoise, Sensors
 from wfbook.simulate import run
 from wfbook.terrain import flat
@@ -22,23 +27,22 @@ DT = 0.002
 UP = np.tile([0.0, 0.0, 1.0], (4, 1))
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def walk():
-    return run(handmade.trot(0.4, 7), hold=0.2)
+    return estimation_cases.walk()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def coast():
-    """Speeds up on feet, rolls on four wheels for 1.2 s, brakes with one foot."""
-    return run(handmade.coast(), hold=0.2)
+    return estimation_cases.coast()
 
 
 def quality(result, wheel_model: str, seed: int) -> tuple[float, float]:
     """Drift in per cent of the way and RMS of the velocity's error, from the plan's start on."""
-    position, velocity = replay(result, wheel_model, seed)
+    estimated = estimate(record(result, seed), wheel_model)
     going = result.t >= 0.0
-    error = (position[:, :3] - result.qpos[:, :3])[going]
-    slow = (velocity[:, :3] - result.qvel[:, :3])[going]
+    error = (estimated.base[:, :3] - result.qpos[:, :3])[going]
+    slow = (estimated.base_velocity[:, :3] - result.qvel[:, :3])[going]
     drift = 100 * np.linalg.norm(error[-1] - error[0]) / result.metrics["distance_m"]
     return drift, np.sqrt(np.mean(np.sum(slow**2, axis=1)))
 
@@ -125,78 +129,11 @@ def test_the_same_seed_gives_the_same_readings(walk):
     assert not np.array_equal(first.joint_angles, other.joint_angles)
 
 
-def consistent_run(seed: int) -> float:
-    """Filter a robot that sways above its rolling feet, with exactly the noise that the filter assumes.
-
-    Returns:
-        The squared error of the trunk's 15 states at the end, normalised by its covariance.
-    """
-    random = np.random.default_rng(seed)
-    noise, tuning = SensorNoise(joint_offset=0.0), Tuning(gate=np.inf, landing=1)
-    estimator = Estimator("encoder", noise, tuning)
-    robot = nominal()
-    white = random.standard_normal
-    feet = np.array(robot["hip_offsets"]) + np.array([0.0, 0.0, robot["com_height"] + 0.02])
-    phase = random.uniform(0, 2 * np.pi, 6)
-    rate = 2 * np.pi * np.array([0.7, 0.9, 0.5, 0.6, 0.8, 0.4])
-
-    def pose(t):
-        sway = np.array([0.03, 0.03, 0.015, 0.06, 0.06, 0.08]) * np.sin(rate * t + phase)
-        return sway[:3] + np.array([0.0, 0.0, robot["com_height"]]), pin.exp3(sway[3:])
-
-    def angles(position, R_wb):
-        ends = (feet - position) @ R_wb
-        return np.array([leg_angles(leg, ends[leg]) for leg in range(4)])
-
-    def imu(t):
-        return pose(t)[0] + pose(t)[1] @ IMU_POSITION
-
-    position, R_wb = pose(0.0)
-    estimator.start(position, R_wb)
-    truth = BaseState(imu(0.0), (imu(DT) - imu(-DT)) / (2 * DT), R_wb, np.zeros(3), np.zeros(3), feet.copy())
-    estimator.state = replace(estimator.state, v=truth.v)
-    error = np.sqrt(np.diag(estimator.covariance)) * white(STATES)
-    estimator.state = estimator.state.plus(error)
-    r, v, bias, drift = truth.r, truth.v, np.zeros(3), np.zeros(3)
-    before = angles(position, R_wb)
-    for k in range(400):
-        _, R_next = pose(DT * (k + 1))
-        omega = pin.log3(R_wb.T @ R_next) / DT
-        R_middle = R_wb @ pin.exp3(0.5 * DT * omega)
-        a = (imu(DT * (k + 2)) - 2 * imu(DT * (k + 1)) + imu(DT * k)) / DT**2
-        r, v = r + DT * v + 0.5 * DT**2 * a, v + DT * a
-        trunk = r - R_next @ IMU_POSITION
-        rates = (angles(trunk, R_next) - before) / DT if k else np.zeros((4, 3))
-        _, _, turning = leg_kinematics(before)
-        spin = np.einsum("lij,lj->li", turning, rates)
-        feet = feet + DT * np.cross((omega + spin) @ R_middle.T, 0.02 * UP)
-        feet = feet + tuning.foot_slip * DT**0.5 * white((4, 3))
-        R_wb = R_next
-        before = angles(trunk, R_wb)
-        bias = bias + noise.accelerometer_walk * DT**0.5 * white(3)
-        drift = drift + noise.gyro_walk * DT**0.5 * white(3)
-        ends = leg_kinematics(before)[0]
-        measured = angles_of(ends + tuning.kinematics * white((4, 3)))
-        reading = Reading(
-            R_middle.T @ (a - GRAVITY) + bias + noise.accelerometer * white(3),
-            omega + drift + noise.gyro * white(3),
-            measured + noise.joint_angle * white((4, 3)),
-            rates + noise.joint_rate * white((4, 3)),
-            np.zeros(4),
-        )
-        estimator.update(reading, np.ones(4, bool), np.zeros(4, bool), UP)
-    final = BaseState(r, v, R_wb, bias, drift, feet).minus(estimator.state)[:15]
-    return final @ np.linalg.solve(estimator.covariance[:15, :15], final)
-
-
-def angles_of(ends: np.ndarray) -> np.ndarray:
-    return np.array([leg_angles(leg, ends[leg]) for leg in range(4)])
-
-
 def test_the_filter_is_as_good_as_it_says():
     """Mean NEES of 20 runs: chi-squared with 300 degrees of freedom over 20, 95 % of it in 12.7 to 17.5."""
-    nees = np.mean([consistent_run(seed) for seed in range(20)])
-    assert 12.69 < nees < 17.49
+    runs = [sway(seed) for seed in range(20)]
+    low, high = nees_bounds(15, 20)
+    assert low < np.mean([nees(error[-1], covariance[-1]) for error, covariance in runs]) < high
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -225,23 +162,7 @@ def test_eq_44_as_printed_loses_the_robot(coast):
 
 def test_eq_44_as_printed_makes_any_speed_decay():
     """A robot rolls at 0.4 m/s, legs still, nothing accelerates: in a second the estimate stands."""
-    random = np.random.default_rng(0)
-    home = np.array(nominal()["joint_angles"]).reshape(4, 3)
-    speeds = {}
-    for model in WHEEL_MODELS:
-        estimator = Estimator(model)
-        estimator.start(np.array([0.0, 0.0, 0.3]), np.eye(3))
-        estimator.state = replace(estimator.state, v=np.array([0.4, 0.0, 0.0]))
-        for _ in range(1500):
-            reading = Reading(
-                -GRAVITY + 0.05 * random.standard_normal(3),
-                0.003 * random.standard_normal(3),
-                home + 3e-4 * random.standard_normal((4, 3)),
-                np.zeros((4, 3)),
-                np.full(4, 0.4 / 0.04),
-            )
-            estimator.update(reading, np.ones(4, bool), np.ones(4, bool), UP)
-        speeds[model] = estimator.state.v[0]
+    speeds = {model: coast_on(0.4, model)[1][-1] for model in WHEEL_MODELS}
     assert speeds["encoder"] == pytest.approx(0.4, abs=0.01)
     assert speeds["slack"] == pytest.approx(0.4, abs=0.1)
     assert abs(speeds["printed"]) < 0.1

@@ -12,9 +12,10 @@ import wfbook
 ROOT = Path(wfbook.__file__).parent
 ORDER = (
     "archive", "polygon", "terrain", "centroidal", "swing", "modes", "leg_path", "friction", "planner",
-    "go1", "go1_dynamics", "standing", "reference", "qp", "wbc", "stance", "sensors", "leg_odometry",
-    "estimator", "footing", "lean", "drift", "tracking", "runs", "simulate", "forecast", "receding", "view",
-    "report", "results", "arguments", "quoted", "table2", "study", "paper", "exercises", "__main__",
+    "go1", "go1_dynamics", "standing", "reference", "qp", "wbc", "stance", "kalman", "sensors",
+    "leg_odometry", "estimator", "recording", "ideal", "footing", "lean", "drift", "tracking", "runs",
+    "simulate", "forecast", "receding", "view", "report", "results", "arguments", "quoted", "table2",
+    "study", "paper", "exercises", "__main__",
 )  # fmt: skip
 """The modules and packages, helpers before the chapter that they serve."""
 

@@ -18,7 +18,6 @@ three models can be chosen (:data:`WHEEL_MODELS`):
 """
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
@@ -40,12 +39,10 @@ from wfbook.leg_odometry import (
     Rolling,
     expected_ends,
     propagate,
+    spins,
 )
 from wfbook.reference import TICK
-from wfbook.sensors import Reading, SensorNoise, Sensors
-
-if TYPE_CHECKING:
-    from wfbook.runs import Run
+from wfbook.sensors import Reading, SensorNoise
 
 WHEEL_MODELS = ("encoder", "slack", "printed")
 """Models of a rolling wheel, by name."""
@@ -180,10 +177,8 @@ class Estimator:
     ) -> None:
         """Propagate the estimate and its covariance over a tick."""
         noise, tuning, dt = self.noise, self.tuning, self.dt
-        spin = (turning @ reading.joint_rates[:, :, None])[:, :, 0]
+        spin = spins(reading, turning, wheels & (self.wheel_model == "encoder"))
         axles = turning[:, :, 2]
-        if self.wheel_model == "encoder":
-            spin = spin + (wheels * reading.wheel_rates)[:, None] * axles
         rolls = self.trusted & ~(wheels & (self.wheel_model == "printed"))
         rolling = Rolling(spin, axles, normals, wheels, rolls)
         self.state, F = propagate(self.state, reading, rolling, dt)
@@ -245,37 +240,3 @@ class Estimator:
         self.state = self.state.plus(K @ innovations)
         P = self.covariance - K @ HP
         self.covariance = 0.5 * (P + P.T)
-
-
-def replay(
-    run: "Run", wheel_model: str = "encoder", seed: int = 0, noise: SensorNoise | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Estimate along a recorded run, as if the robot had done the same with other sensors.
-
-    Args:
-        run: with any controller.
-        wheel_model: one of :data:`WHEEL_MODELS`.
-        seed: of the sensors' noise.
-        noise: of the sensors.
-
-    Returns:
-        ``(N, 7)`` and ``(N, 6)``: the trunk's configuration and velocity, in MuJoCo's convention.
-    """
-    dt = float(run.t[1] - run.t[0])
-    sensors, estimator = Sensors(seed, noise, dt), Estimator(wheel_model, noise, dt=dt)
-    R_wb = pin.Quaternion(*run.qpos[0, 3:7]).toRotationMatrix()
-    estimator.start(run.qpos[0, :3], sensors.tilted(R_wb))
-    regions, below = run.terrain.regions, np.zeros(4, int)
-    positions, velocities = [], []
-    for k in range(len(run.t)):
-        if len(regions) > 1:
-            found = [run.terrain.region_at(x, y) for x, y in run.p[k, :, :2]]
-            below = np.array([old if new is None else new for old, new in zip(below, found, strict=True)])
-        normals = np.array([regions[i].normal for i in below])
-        reading = sensors.read(run.qpos[k], run.qvel[k])
-        touching = np.linalg.norm(run.contact_force[k], axis=1) > TOUCH
-        estimator.update(reading, touching, run.end_effector[k] == 1, normals)
-        position, velocity = estimator.base()
-        positions.append(position)
-        velocities.append(velocity)
-    return np.array(positions), np.array(velocities)

@@ -15,7 +15,7 @@ from typing import Self
 import numpy as np
 import pinocchio as pin
 
-from wfbook.go1 import FOOT_RADIUS, WHEEL_RADIUS
+from wfbook.go1 import FOOT_RADIUS, IMU_POSITION, WHEEL_RADIUS, leg_kinematics
 from wfbook.go1_dynamics import GRAVITY, WHEEL_FLATNESS, contact_offsets, cross, dot, skew
 from wfbook.sensors import Reading
 
@@ -61,6 +61,17 @@ class BaseState:
             self.gyro_bias + error[GYRO_BIAS],
             self.p + error[ENDS].reshape(4, 3),
         )
+
+    def moved(self, shift: np.ndarray, turn: np.ndarray) -> Self:
+        """Return the state of the same robot elsewhere: turned about the origin, then shifted.
+
+        Args:
+            shift: ``(3,)`` in the world.
+            turn: ``(3,)`` rotation vector in the world.
+        """
+        R = pin.exp3(np.asarray(turn, float))
+        moved = self.r @ R.T + shift, self.v @ R.T, R @ self.R_wb
+        return type(self)(*moved, self.accelerometer_bias, self.gyro_bias, self.p @ R.T + shift)
 
     def minus(self, other: Self) -> np.ndarray:
         """Return the error ``(27,)`` with ``other.plus(error)`` being this state."""
@@ -197,3 +208,41 @@ def expected_ends(state: BaseState, printed: np.ndarray) -> tuple[np.ndarray, np
         H[printed, 0, VELOCITY] -= R_bw[0]
         H[printed, 0, TURN] -= R_bw[0] @ skew(state.v)
     return ends, H
+
+
+def spins(reading: Reading, turning: np.ndarray, counted: np.ndarray) -> np.ndarray:
+    """Return the angular velocities of what rolls below each leg, relative to the trunk and in its frame.
+
+    Args:
+        reading: of the encoders.
+        turning: ``(4, 3, 3)`` Jacobians of the calves' angular velocities; their last columns are the axles.
+        counted: ``(4,)`` bool, legs whose wheel turns on its axle, too, and has an encoder there.
+
+    Returns:
+        ``(4, 3)``
+    """
+    calves = (turning @ reading.joint_rates[:, :, None])[:, :, 0]
+    if not counted.any():
+        return calves
+    return calves + (counted * reading.wheel_rates)[:, None] * turning[:, :, 2]
+
+
+def leg_velocities(reading: Reading, R_wb: np.ndarray, rolling: Rolling) -> np.ndarray:
+    """Return the velocity of the inertial unit that each leg measures if it stands.
+
+    A leg's end moves with ``ω × r n`` in the world, and with ``J q̇ + ω_b × e`` relative to the inertial unit;
+    the difference is how the inertial unit moves.
+
+    Args:
+        reading: of encoders and gyro.
+        R_wb: ``(3, 3)`` orientation of the trunk.
+        rolling: what the legs' ends do.
+
+    Returns:
+        ``(4, 3)`` in the world.
+    """
+    ends, jacobians, _ = leg_kinematics(reading.joint_angles)
+    stick = (jacobians @ reading.joint_rates[:, :, None])[:, :, 0]
+    stick += cross(reading.gyro, ends - IMU_POSITION)
+    lever, _ = rolling.levers(R_wb)
+    return cross((reading.gyro + rolling.spin) @ R_wb.T, lever) - stick @ R_wb.T

@@ -32,6 +32,7 @@ class Motion:
         planned_com: (N, 3); the measured one itself where nobody planned.
         measured_com: (N, 3), or None for a plan that nobody has executed.
         terrain: the ground.
+        believed: (N, 7) where the robot thinks its trunk is, as in ``qpos``; None if it knows.
     """
 
     start: float
@@ -43,6 +44,7 @@ class Motion:
     planned_com: np.ndarray
     measured_com: np.ndarray | None
     terrain: Terrain
+    believed: np.ndarray | None = None
 
 
 def motion_of_run(run: "Run") -> Motion:
@@ -56,6 +58,7 @@ def motion_of_run(run: "Run") -> Motion:
     total = np.concatenate([np.zeros((1, len(LEGS), 3)), np.cumsum(run.contact_force, axis=0)])
     first, last = edges.T
     force = (total[last] - total[first]) / (last - first)[:, None, None]
+    knows = np.array_equal(run.base_estimate, run.qpos[:, :7])
     return Motion(
         start=float(times[0]),
         qpos=run.qpos[at],
@@ -66,6 +69,7 @@ def motion_of_run(run: "Run") -> Motion:
         planned_com=run.com_ref[at],
         measured_com=run.com[at],
         terrain=run.terrain,
+        believed=None if knows else run.base_estimate[at],
     )
 
 

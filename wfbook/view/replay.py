@@ -2,14 +2,18 @@
 
     replay.save(run, "replay.html")     one file; "replay.html#t=1.5" opens still at 1.5 s
     Replay(run)                         at the end of a cell, shows itself
+    SideBySide({"this": a, "that": b})  likewise, in a row
 
 A replay shows the robot with the end effector it uses (green foot, orange wheel), the contact forces, where
-the legs stood and rolled, and the path of the centre of mass. A plan can be replayed too, before any
-controller has seen it: then the robot is posed as the plan wants it.
+the legs stood and rolled, and the path of the centre of mass. The trunk of a robot that has to estimate where
+it is appears twice: where it is, and, light blue, where it believes to be. A plan can be replayed too, before
+any controller has seen it: then the robot is posed as the plan wants it.
 """
 
 import itertools
 import os
+from collections.abc import Mapping
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,7 +28,7 @@ from wfbook.view import scene
 from wfbook.view.meshcat_static import Recorder, frame, page
 from wfbook.view.motion import Motion, motion_of_plan, motion_of_run, motion_of_standing
 from wfbook.view.spans import SWINGING, spans
-from wfbook.view.style import FOOT, FORCE, MEASURED, MODE_COLOURS, PLANNED, WHEEL
+from wfbook.view.style import ESTIMATED, FOOT, FORCE, MEASURED, MODE_COLOURS, PLANNED, WHEEL
 from wfbook.view.tracks import Tracks
 
 if TYPE_CHECKING:
@@ -51,6 +55,8 @@ def html(motion: "Run | Plan | Standing", title: str | None = None, beside: str 
         legend["CoM planned"] = PLANNED
     if shown.measured_com is not None:
         legend["CoM measured"] = MEASURED
+    if shown.believed is not None:
+        legend["trunk, as it believes"] = ESTIMATED
     return page(commands(shown), title or f"replay: {shown.terrain.name}", legend, shown.start, beside)
 
 
@@ -79,6 +85,24 @@ class Replay:
         return self._html
 
 
+class SideBySide:
+    """Shows several replays in a row, each under its name.
+
+    Args:
+        motions: by name, what to replay.
+        height: of the frames, in pixels.
+    """
+
+    def __init__(self, motions: "Mapping[str, Run | Plan]", height: int = 300) -> None:
+        self._html = "".join(
+            f'<div style="flex:1 1 380px"><b>{escape(name)}</b>{frame(html(motion), height)}</div>'
+            for name, motion in motions.items()
+        )
+
+    def _repr_html_(self) -> str:
+        return f'<div style="display:flex;flex-wrap:wrap;gap:8px">{self._html}</div>'
+
+
 def commands(motion: Motion) -> list[dict]:
     """Return Meshcat's commands that draw and animate a motion."""
     recorder = Recorder()
@@ -97,6 +121,10 @@ def commands(motion: Motion) -> list[dict]:
         scene.add_line(visualizer["com/planned"], motion.planned_com, PLANNED)
     if motion.measured_com is not None:
         scene.add_line(visualizer["com/measured"], motion.measured_com, MEASURED)
+    if motion.believed is not None:
+        scene.add_ghost(visualizer["believed"], model, ESTIMATED)
+        tracks.add(visualizer["believed"], "position", motion.believed[:, :3])
+        tracks.add(visualizer["believed"], "quaternion", motion.believed[:, 3:])
     tracks.play(visualizer)
     return recorder.commands
 

@@ -94,6 +94,19 @@ def add_robot(visualizer: Visualizer, model: mujoco.MjModel) -> dict[str, Visual
     return named
 
 
+def add_ghost(node: Visualizer, model: mujoco.MjModel, colour: str) -> None:
+    """Draw the trunk alone, to be seen through, a little larger than it is: it may be where the robot is."""
+    trunk = model.body("trunk").id
+    for i in np.flatnonzero(model.geom_bodyid == trunk):
+        if model.geom_group[i] >= _COLLISION_GROUP:
+            continue
+        rotation = np.empty(9)
+        mujoco.mju_quat2Mat(rotation, model.geom_quat[i])
+        part = node[f"geom{i}"]
+        part.set_transform(pose(model.geom_pos[i], 1.04 * rotation.reshape(3, 3)))
+        part.set_object(_geometry(model, int(i)), material(colour, transparent=True, opacity=0.5))
+
+
 def _geometry(model: mujoco.MjModel, index: int) -> g.Geometry:
     """Return the Meshcat shape of a geom, in the geom's frame."""
     kind, size = mujoco.mjtGeom(int(model.geom_type[index])), model.geom_size[index]
