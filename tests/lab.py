@@ -1,7 +1,6 @@
 """A JupyterLab of the tests' own, and the browser that opens it. Nothing of either may outlive the tests."""
 
 import contextlib
-import json
 import os
 import secrets
 import shutil
@@ -13,7 +12,7 @@ import threading
 import time
 import urllib.error
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import psutil
@@ -88,14 +87,7 @@ class Lab:
 
     def kernels(self) -> list[psutil.Process]:
         """Return the processes of the kernels that run now."""
-        return [process for process in self._descendants() if _connection_file(process)]
-
-    def strange_ports(self, kernel: psutil.Process) -> set[int]:
-        """Return the ports on which a kernel, or a process that it started, listens besides its own."""
-        own = json.loads(Path(_connection_file(kernel)).read_text())
-        family = [kernel, *kernel.children(recursive=True)]
-        listening = {port for process in family for port in _listening(process)}
-        return listening - {value for name, value in own.items() if name.endswith("_port")}
+        return [process for process in self._descendants() if _is_kernel(process)]
 
     def stop(self) -> list[str]:
         """End the server as a user does, with a signal, and then by force whatever is left.
@@ -160,20 +152,21 @@ def watched(seconds: float) -> Iterator[None]:
         timer.cancel()
 
 
-def _connection_file(process: psutil.Process) -> str | None:
-    """Return the connection file of a kernel; None if the process is something else."""
+def listening(family: Iterable[psutil.Process]) -> set[int]:
+    """Return the ports on which processes listen."""
+    ports = set()
+    for process in family:
+        with contextlib.suppress(psutil.NoSuchProcess):
+            found = process.net_connections("inet")
+            ports |= {place.laddr.port for place in found if place.status == psutil.CONN_LISTEN}
+    return ports
+
+
+def _is_kernel(process: psutil.Process) -> bool:
     try:
-        words = process.cmdline()
+        return "ipykernel_launcher" in process.cmdline()
     except psutil.NoSuchProcess:
-        return None
-    return words[words.index("-f") + 1] if "ipykernel_launcher" in words and "-f" in words else None
-
-
-def _listening(process: psutil.Process) -> set[int]:
-    with contextlib.suppress(psutil.NoSuchProcess):
-        found = process.net_connections("inet")
-        return {place.laddr.port for place in found if place.status == psutil.CONN_LISTEN}
-    return set()
+        return False
 
 
 def _described(process: psutil.Process) -> str:
