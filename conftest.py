@@ -1,10 +1,11 @@
-"""Times the chapters in every run of pytest; see tests/chapter_times.py."""
+"""What holds for every run of pytest: chapters are timed, and nothing is left running."""
 
 from chapter_times import OPTION, ChapterTimes
+from leftovers import Leftovers
 
 
 def pytest_addoption(parser):
-    """Let the budgets be written again."""
+    """Let the chapters' budgets be written again."""
     parser.addoption(
         OPTION,
         action="store_true",
@@ -13,5 +14,7 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
-    """Watch the chapters' cells."""
+    """Watch the chapters' cells, and the processes."""
     config.pluginmanager.register(ChapterTimes(config), "chapter-times")
+    if not hasattr(config, "workerinput"):  # pytest-xdist's workers inherit the mark
+        config.pluginmanager.register(Leftovers(), "leftovers")

@@ -101,7 +101,7 @@ class Lab:
             with contextlib.suppress(subprocess.TimeoutExpired):
                 self._server.wait(PATIENCE)
         _, alive = psutil.wait_procs(self._seen, timeout=5.0)
-        left = [_described(process) for process in alive]
+        left = [described(process) for process in alive]
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self._server.pid, signal.SIGKILL)
         for process in alive:
@@ -169,7 +169,8 @@ def _is_kernel(process: psutil.Process) -> bool:
         return False
 
 
-def _described(process: psutil.Process) -> str:
+def described(process: psutil.Process) -> str:
+    """Return a process's command line."""
     try:
         return " ".join(process.cmdline()) or process.name()
     except psutil.NoSuchProcess:

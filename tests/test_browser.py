@@ -134,6 +134,21 @@ def test_a_chapter_in_a_browser(name, lab, page):
     assert psutil.wait_procs(family, timeout=20.0)[1] == [], "a process outlives its kernel"
 
 
+def test_a_page_that_asks_elsewhere_is_found_out(page):
+    address = "http://192.0.2.1/picture.png"
+    page.set_content(f"<img src={address!r} alt=''><p>text</p>")
+    page.wait_for_selector("p")
+    assert page.asked == [address]
+
+
+@pytest.mark.parametrize(("ci", "outcome"), [("true", pytest.fail.Exception), ("", pytest.skip.Exception)])
+def test_without_a_browser_ci_fails_and_others_skip(ci, outcome, monkeypatch):
+    monkeypatch.setenv("CI", ci)
+    monkeypatch.setenv("PATH", "")
+    with pytest.raises(outcome, match="no browser"):
+        chromium()
+
+
 def test_nothing_is_left_running(lab):
     assert lab.stop() == []
 

@@ -1,4 +1,4 @@
-"""Each chapter has a budget of time, and CI fails when one takes double."""
+"""Each chapter has a budget of time, CI fails when one takes double, and nothing may be left running."""
 
 import json
 import os
@@ -12,6 +12,15 @@ import pytest
 from chapter_times import FACTOR, LEAST, Line, read, write
 
 ROOT = Path(__file__).parent.parent
+
+SERVER = """
+import os, socket, time
+place = socket.create_server(("127.0.0.1", 0))
+if os.fork() == 0:
+    os.setsid()
+    time.sleep(15)
+"""
+"""What a chapter must not leave behind: a kernel ends its children and its group, but not this."""
 
 
 def test_each_chapter_has_a_budget_and_each_budget_a_chapter():
@@ -69,16 +78,18 @@ def test_the_fixed_work_takes_some_hundredths_of_a_second():
 
 @pytest.fixture
 def book(tmp_path):
-    """A book of two chapters, with this project's plugin; the second fails."""
-    for name, code in (("00_good", ["a = 2", "assert a == 2"]), ("01_bad", ["a = 2", "assert a == 3"])):
+    """A book of two chapters, with this project's plugins; the second chapter fails."""
+    (tmp_path / "server.py").write_text(SERVER)
+    bad = ["import subprocess, sys; subprocess.run([sys.executable, '../server.py'])", "assert False"]
+    for name, code in (("00_good", ["a = 2", "assert a == 2"]), ("01_bad", bad)):
         notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(line) for line in code])
         notebook.metadata["kernelspec"] = {"name": "python3", "display_name": "", "language": "python"}
         (tmp_path / "notebooks").mkdir(exist_ok=True)
         nbformat.write(notebook, tmp_path / "notebooks" / f"{name}.ipynb")
     (tmp_path / "tests").mkdir()
-    for path in (Path("conftest.py"), Path("tests") / "chapter_times.py"):
-        text = (ROOT / path).read_text().replace(f"LEAST = {LEAST}", "LEAST = 0.0")
-        (tmp_path / path).write_text(text)
+    for name in ("conftest.py", "tests/chapter_times.py", "tests/leftovers.py", "tests/lab.py"):
+        text = (ROOT / name).read_text().replace(f"LEAST = {LEAST}", "LEAST = 0.0")
+        (tmp_path / name).write_text(text.replace("PATIENCE = 60.0", "PATIENCE = 0.0"))
     (tmp_path / "pytest.ini").write_text("[pytest]\npythonpath = tests\naddopts = --nbval-lax\n")
     return tmp_path
 
@@ -101,8 +112,10 @@ def test_a_run_of_pytest_writes_budgets_and_in_ci_fails_by_them(book):
     budgets = book / chapter_times.FILE
     assert code == 1 and "not run whole, or failed: 01_bad" in text
     assert list(read(budgets)) == ["00_good"], "a chapter that fails gets no budget"
+    assert "still running after the tests: " in text and "server.py" in text
 
     first, entry = "notebooks/00_good.ipynb", {"seconds": 1e-3, "calibration_s": 1e3}
     budgets.write_text(json.dumps({"00_good": entry}))
     code, text = pytest_in(book, first, CI="true")
     assert code == 1 and "MORE THAN DOUBLE" in text and "2 passed" in text
+    assert "still running" not in text
