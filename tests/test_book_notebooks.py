@@ -54,11 +54,14 @@ def checker(chapter):
 
 
 def checks_of(module):
-    """The public functions that a module of checks defines itself."""
+    """The checks in a module: its public functions that return a line of text."""
     return {
         name: function
         for name, function in vars(module).items()
-        if inspect.isfunction(function) and function.__module__ == module.__name__ and name[0] != "_"
+        if inspect.isfunction(function)
+        and function.__module__ == module.__name__
+        and name[0] != "_"
+        and inspect.signature(function).return_annotation in (str, "str")
     }
 
 
@@ -111,13 +114,11 @@ def test_it_opens_with_a_title_a_promise_and_what_is_needed(chapter):
 
 
 @every_chapter
-def test_it_ends_with_exercises_and_a_summary(chapter):
+def test_it_ends_with_a_summary(chapter):
     sections = [(text, cell) for level, text, cell in chapter.headings if level == 2]
-    names = [text for text, _ in sections]
-    assert names.count("Exercises") == names.count("Summary") == 1
     assert sections[-1] == ("Summary", len(chapter.cells) - 1), "the summary comes last"
     assert "**The way on.**" in chapter.cells[-1].source
-    differing = [text for text in names if "differ" in text.lower()]
+    differing = [text for text, _ in sections if {"paper", "differ"} <= set(text.lower().split())]
     assert set(differing) <= {"Where the paper and this book differ"}
 
 
@@ -128,15 +129,17 @@ def test_something_is_touched_and_something_moves(chapter):
 
 
 @every_chapter
-def test_there_are_three_to_five_exercises_under_their_heading(chapter):
-    found = exercises(chapter)
-    start = next(cell for level, text, cell in chapter.headings if (level, text) == (2, "Exercises"))
-    tasks = [(text, cell) for level, text, cell in chapter.headings if level == 3 and cell >= start]
-    numbered = [(text, cell) for text, cell in tasks if re.match(r"\d\. \S", text)]
-    assert 3 <= len(found) <= 5 and len(numbered) == len(found)
-    for number, ((text, task), (solutions, check)) in enumerate(zip(numbered, found, strict=True), 1):
-        assert text.startswith(f"{number}. ")
-        assert task < solutions[0] and solutions[-1] + 1 == check, f"exercise {number}: out of order"
+def test_there_are_three_to_five_numbered_exercises(chapter):
+    found, after = exercises(chapter), 0
+    assert 3 <= len(found) <= 5
+    for number, (solutions, check) in enumerate(found, 1):
+        tasks = [cell.source for cell in chapter.cells[after : solutions[0]] if cell.cell_type == "markdown"]
+        begins = re.compile(rf"^(#+ |\*\*)(Exercise )?{number}[.:] ", re.MULTILINE)
+        assert any(map(begins.search, tasks)), (
+            f"exercise {number}: no heading '### {number}. What it is about'"
+        )
+        assert solutions[-1] + 1 == check, f"exercise {number}: its check is not next to its solution"
+        after = check + 1
 
 
 @every_chapter
