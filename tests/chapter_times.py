@@ -108,11 +108,12 @@ def read(path: Path) -> dict[str, tuple[float, float]]:
 
 def write(path: Path, lines: Iterable[Line], chapters: Iterable[str]) -> None:
     """Set the budgets of some chapters, and forget chapters that are no more."""
+    there = set(chapters)
     budgets = read(path) | {line.name: (round(line.seconds, 1), round(line.calibration, 4)) for line in lines}
     kept = {
         name: {"seconds": seconds, "calibration_s": calibration}
         for name, (seconds, calibration) in sorted(budgets.items())
-        if name in set(chapters)
+        if name in there
     }
     path.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
 

@@ -67,8 +67,8 @@ def test_without_a_budget_nothing_is_over():
 def test_writing_keeps_the_others_and_forgets_what_is_gone(tmp_path):
     file = tmp_path / "times.json"
     old = {name: Line(name, 7.0, 0.02, None) for name in ("00_a", "01_b", "02_gone")}
-    write(file, old.values(), old)
-    write(file, [Line("01_b", 9.04, 0.03, None)], ["00_a", "01_b"])
+    write(file, old.values(), iter(old))
+    write(file, [Line("01_b", 9.04, 0.03, None)], iter(["00_a", "01_b"]))
     assert read(file) == {"00_a": (7.0, 0.02), "01_b": (9.0, 0.03)}
 
 
