@@ -3,13 +3,13 @@
 import base64
 import gzip
 import re
-import shutil
-import subprocess
 from dataclasses import replace
 
 import mujoco
 import numpy as np
 import pytest
+from lab import CHROMIUM, chromium, watched
+from playwright.sync_api import sync_playwright
 from view_cases import small_plan, small_run
 
 from wfbook.go1 import ASSETS
@@ -279,19 +279,15 @@ def test_shape_that_cannot_be_drawn_is_named():
         scene.add_robot(Recorder().visualizer(), model)
 
 
-@pytest.mark.skipif(shutil.which("chromium") is None, reason="needs the browser chromium")
 def test_a_browser_plays_the_file(tmp_path, run):
     """Open the page as a file, still at 0.5 s, in a real browser with software WebGL."""
     replay.save(run, tmp_path / "replay.html")
-    options = ["--headless", "--no-sandbox", "--no-first-run", "--disable-background-networking"]
-    options += ["--disable-component-update", "--disable-sync", "--disable-quic"]
-    options += [
-        "--use-angle=swiftshader",
-        "--enable-unsafe-swiftshader",
-        f"--user-data-dir={tmp_path / 'home'}",
-    ]
-    address = f"{(tmp_path / 'replay.html').as_uri()}#t=0.5"
-    command = ["chromium", *options, "--virtual-time-budget=5000", "--dump-dom", address]
-    shown = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout
-    assert re.search(r'id="clock"[^>]*>0\.50 / 1\.4\d s<', shown), "the clock did not start"
-    assert re.search(r'id="message"[^>]*hidden', shown), "an error message is shown"
+    path = chromium()
+    with watched(120.0), sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=path, args=list(CHROMIUM), timeout=60e3)
+        page = browser.new_page()
+        page.goto(f"{(tmp_path / 'replay.html').as_uri()}#t=0.5")
+        page.wait_for_selector("body[data-state=ready]", state="attached", timeout=60e3)
+        assert re.fullmatch(r"0\.50 / 1\.4\d s", page.inner_text("#clock")), "the clock did not start there"
+        assert page.is_hidden("#message"), "an error message is shown"
+        browser.close()

@@ -70,7 +70,9 @@ class Player {
       if (this.time >= this.duration) this.play(false);
     }
     this.previous = now;
-    if (this.viewer.needs_render) this.viewer.render();
+    if (!this.viewer.needs_render) return;
+    this.viewer.render();
+    document.body.dataset.state = "ready";
   }
 
   show(seen) {
@@ -135,6 +137,7 @@ async function load() {
 }
 
 function fail(error) {
+  document.body.dataset.state = "failed";
   element("message").hidden = false;
   element("message").textContent = "This replay can't be shown (it needs WebGL): " + error.message;
   throw error;

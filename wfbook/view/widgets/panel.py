@@ -8,6 +8,9 @@ import ipywidgets
 
 from wfbook.view.style import Picture
 
+PANEL = "wfbook-panel"
+"""CSS class of a widget with controls and pictures that follow them; the browser test looks for it."""
+
 
 def image(picture: Picture, description: str) -> str:
     """Return a picture as an HTML element that needs no file; ``description`` is read to who can't see it."""
@@ -32,7 +35,8 @@ class Panel(ipywidgets.VBox):
     """Controls over pictures that follow them.
 
     A subclass makes its controls, calls this constructor with them and with the names of its pictures, and
-    says in :meth:`redraw` what they look like now. Every change of a control's ``value`` redraws.
+    says in :meth:`redraw` what they look like now. Every change of a control's ``value`` redraws. On a page a
+    panel has the CSS class ``wfbook-panel``.
 
     Args:
         controls: laid out from left to right, wrapped where the page is narrow.
@@ -50,6 +54,7 @@ class Panel(ipywidgets.VBox):
         self.pictures: dict[str, Picture] = {}
         row = ipywidgets.HBox(list(controls), layout=ipywidgets.Layout(flex_flow="row wrap"))
         super().__init__([row, self.status, *self.views.values()])
+        self.add_class(PANEL)
         self.watch(*controls)
         self._follow()
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import ipywidgets
 
 from wfbook.view import figures
-from wfbook.view.widgets.panel import image, table
+from wfbook.view.widgets.panel import PANEL, image, table
 
 if TYPE_CHECKING:
     from wfbook.planner import Plan, Problem, Progress
@@ -56,6 +56,7 @@ class WheelsToggle(ipywidgets.VBox):
         )
         self.status, self.comparison, self.gait, self.path = (ipywidgets.HTML() for _ in range(4))
         super().__init__([self.allow_wheels, self.status, self.comparison, self.gait, self.path])
+        self.add_class(PANEL)
         if plan is not None:
             self._plans[self.allow_wheels.value] = plan
             self._list_plans()
