@@ -2,8 +2,8 @@
 
 The planner knows a body with four reach boxes and keeps it level. A level trunk above a slope has its uphill
 legs folded and its downhill legs stretched: on 12 degrees the uphill knees touch the ground. The
-controller therefore turns the trunk with the plane of the planned footholds. The centre of mass and the
-contacts stay where the plan has them.
+controller therefore turns the trunk until all hips are alike in height above the planned footholds. The
+centre of mass and the contacts stay where the plan has them.
 """
 
 import math
@@ -26,8 +26,8 @@ _SPLINE = (
 class Lean:
     """The trunk's orientation over time: smooth, and at rest where the ground's slope does not change.
 
-    The control values of a cubic B-spline are the slopes of the planes through the four contacts where slots
-    begin and end. Such a curve has a continuous acceleration and foresees the next slope by a slot.
+    The control values of a cubic B-spline are the angles that even the hips out where slots begin and end. Such
+    a curve has a continuous acceleration and foresees the next slope by a slot.
 
     Args:
         plan: whose footholds are followed.
