@@ -26,8 +26,8 @@ _SPLINE = (
 class Lean:
     """The trunk's orientation over time: smooth, and at rest where the ground's slope does not change.
 
-    The control values of a cubic B-spline are the angles that even the hips out where slots begin and end. Such
-    a curve has a continuous acceleration and foresees the next slope by a slot.
+    The control values of a cubic B-spline are the angles that even out the hips where slots begin and end.
+    Such a curve has a continuous acceleration and foresees the next slope by a slot.
 
     Args:
         plan: whose footholds are followed.
