@@ -1,6 +1,7 @@
 """A JupyterLab of the tests' own, and the browser that opens it. Nothing of either may outlive the tests."""
 
 import contextlib
+import json
 import os
 import secrets
 import shutil
@@ -14,6 +15,7 @@ import urllib.error
 import urllib.request
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
@@ -89,6 +91,11 @@ class Lab:
         """Return the processes of the kernels that run now."""
         return [process for process in self._descendants() if _is_kernel(process)]
 
+    def shut_down_kernels(self) -> None:
+        """End all kernels, as JupyterLab's own menu does: one that is merely killed is started again."""
+        for kernel in json.load(self._ask("/api/kernels")):
+            self._ask(f"/api/kernels/{kernel['id']}", method="DELETE").close()
+
     def stop(self) -> list[str]:
         """End the server as a user does, with a signal, and then by force whatever is left.
 
@@ -120,14 +127,17 @@ class Lab:
             return now
         return set()
 
+    def _ask(self, path: str, method: str = "GET") -> Any:
+        """Return the server's answer, a file to read."""
+        headers = {"Authorization": f"token {self.token}"}
+        request = urllib.request.Request(f"{self.address}{path}", headers=headers, method=method)
+        return urllib.request.urlopen(request, timeout=10.0)
+
     def _wait_until_it_answers(self) -> None:
-        request = urllib.request.Request(
-            f"{self.address}/api/status", headers={"Authorization": f"token {self.token}"}
-        )
         end = time.monotonic() + PATIENCE
         while self._server.poll() is None and time.monotonic() < end:
             with contextlib.suppress(urllib.error.URLError, ConnectionError, TimeoutError):
-                urllib.request.urlopen(request, timeout=5.0).close()
+                self._ask("/api/status").close()
                 return
             time.sleep(0.1)
         self.stop()

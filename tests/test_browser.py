@@ -18,6 +18,12 @@ WHOLE_TEST = 420.0
 RUN_ALL = 300 * SECOND
 ANSWER = 20 * SECOND
 
+MOST = 4
+"""How many of a panel's controls are tried; of some a picture may not depend for the moment."""
+
+BUTTON = ".jupyter-button.mod-primary"
+"""Starts what takes too long to follow a slider."""
+
 CONTROLS = {
     "slider": ".widget-slider .noUi-handle",
     "checkbox": ".widget-checkbox input",
@@ -84,7 +90,7 @@ def browser(lab):
 
 
 @pytest.fixture
-def page(browser):
+def page(browser, lab):
     """An empty page that can only reach this machine; ``page.asked`` are the other addresses it wanted."""
     # Reduced motion: replays wait for their button, and leave the processor to the kernel meanwhile.
     context = browser.new_context(viewport={"width": 1400, "height": 1000}, reduced_motion="reduce")
@@ -108,6 +114,7 @@ def page(browser):
     with watched(WHOLE_TEST):
         yield page
         context.close()
+    lab.shut_down_kernels()  # what a chapter that failed has left
 
 
 @pytest.mark.parametrize("name", [path.name for path in PATHS])
@@ -170,14 +177,20 @@ def assert_a_widget_answers(page):
 
 
 def answered(page, panel, tried):
-    """Move the panel's controls in their order on the page until its pictures change."""
-    for control in panel.locator(", ".join(CONTROLS.values())).all():
+    """Move the panel's controls in their order on the page until its pictures change.
+
+    A panel that waits for its button gets it pressed.
+    """
+    button = panel.locator(BUTTON).first
+    for control in panel.locator(", ".join(CONTROLS.values())).all()[:MOST]:
         if not control.is_visible() or not control.is_enabled():
             continue
         before = panel.evaluate(PICTURES)
         kind = next(k for k, css in CONTROLS.items() if control.evaluate("(e, css) => e.matches(css)", css))
         tried.append(kind)
         move(control, kind)
+        if button.count() and button.is_enabled():
+            button.click()
         try:
             page.wait_for_function(
                 f"([panel, before]) => ({PICTURES})(panel) !== before",
@@ -205,10 +218,21 @@ def move(control, kind):
         control.click()
 
 
+def bring_into_view(page, locator):
+    """Scroll until an element stays in the middle: cells above it take their height when they are seen."""
+    for _ in range(20):
+        locator.evaluate("(element) => element.scrollIntoView({block: 'center'})")
+        page.wait_for_timeout(300)
+        box = locator.bounding_box()
+        if box and box["y"] >= 0.0 and box["y"] + box["height"] <= page.viewport_size["height"]:
+            return
+    pytest.fail("the replay can't be scrolled into view")
+
+
 def assert_a_replay_plays(page):
     """The first replay of the page draws when it is seen, and moves when its button is pressed."""
     frame = page.locator("iframe[title=replay]").first
-    frame.scroll_into_view_if_needed()
+    bring_into_view(page, frame)
     inside = frame.element_handle().content_frame()
     inside.wait_for_selector("body[data-state=ready]", state="attached")
     picture = Image.open(io.BytesIO(frame.screenshot())).convert("RGB")

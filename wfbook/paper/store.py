@@ -23,8 +23,8 @@ T = TypeVar("T")
 
 _PACKAGES = ("clarabel", "cvxpy", "daqp", "mujoco", "numpy", "osqp", "pin", "pyscipopt", "scipy")
 _PLANNING = (
-    *("archive.py", "centroidal.py", "friction.py", "modes.py", "planner", "polygon.py", "swing.py"),
-    "terrain.py",
+    *("archive.py", "centroidal.py", "friction.py", "leg_path.py", "modes.py", "planner", "polygon.py"),
+    *("swing.py", "terrain.py"),
 )
 """What plans depend on: the modules in the order of the chapters up to the planner."""
 
