@@ -134,8 +134,7 @@ class Go1:
         self, terrain: "Terrain", joint_friction: float = 0.0, trunk_mass_scale: float = 1.0
     ) -> None:
         spec = mujoco.MjSpec.from_file(str(ASSETS / "go1.xml"))
-        for index, body in enumerate(convex_bodies(terrain)):
-            _add_body(spec, [terrain.regions[i] for i in body], index)
+        add_ground(spec, terrain, WHEEL_RADIUS)
         self.terrain = terrain
         self.model = model = spec.compile()
         self.data = mujoco.MjData(model)
@@ -298,7 +297,19 @@ def _convex(terrain: "Terrain", a: list[int], b: list[int]) -> bool:
     return above < _SEAM and abs(ConvexHull(corners[:, :2]).volume - sum(areas)) < _SEAM * sum(areas)
 
 
-def _add_body(spec: mujoco.MjSpec, regions: "list[Region]", index: int) -> None:
+def add_ground(spec: mujoco.MjSpec, terrain: "Terrain", wheel_radius: float) -> None:
+    """Add a terrain to a robot's model: what feet and hulls touch (bit 1) and what wheels touch (bit 2).
+
+    Args:
+        spec: of the robot.
+        terrain: to stand on.
+        wheel_radius: of the robot's wheels; the rolling resistance is over it.
+    """
+    for index, body in enumerate(convex_bodies(terrain)):
+        _add_body(spec, [terrain.regions[i] for i in body], index, wheel_radius)
+
+
+def _add_body(spec: mujoco.MjSpec, regions: "list[Region]", index: int, wheel_radius: float) -> None:
     """Add regions to a model as the top of one convex body, once for feet and once for wheels."""
     corners = np.vstack([region.vertices for region in regions])
     centre, region = corners.mean(axis=0), regions[0]
@@ -306,7 +317,7 @@ def _add_body(spec: mujoco.MjSpec, regions: "list[Region]", index: int) -> None:
     prism = np.vstack([top, top - [0.0, 0.0, _THICKNESS]])
     spec.add_mesh(name=f"ground_{index}", uservert=prism.ravel())
     for kind, bit, mu in (("foot", 1, region.mu_foot), ("wheel", 2, region.mu_wheel_lateral)):
-        rolling = region.rolling_resistance * WHEEL_RADIUS if kind == "wheel" else 0.0
+        rolling = region.rolling_resistance * wheel_radius if kind == "wheel" else 0.0
         spec.worldbody.add_geom(
             name=f"ground_{index}_{kind}",
             type=mujoco.mjtGeom.mjGEOM_MESH,
