@@ -12,7 +12,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from wfbook.omni.robot import WHEEL_POSITIONS
-from wfbook.omni.wheels import HYSTERESIS, REST_SPEED, accelerated, wheel_command, wheel_velocities
+from wfbook.omni.wheels import (
+    HYSTERESIS,
+    REST_SPEED,
+    accelerated,
+    constraint_matrix,
+    wheel_command,
+    wheel_velocities,
+)
 
 _SHARES = (1.0, 0.7, 0.5, 0.35, 0.25, 0.17, 0.12, 0.08)
 """Of the acceleration asked for, tried one after the other."""
@@ -89,20 +96,21 @@ class Base:
         """``(3,)`` of the body now."""
         return self.state[3:].copy()
 
-    def advance(self, wanted: np.ndarray, dt: float) -> None:
-        """Move on by a time step towards a wanted twist ``(3,)``."""
+    def advance(self, wanted: np.ndarray, dt: float) -> np.ndarray:
+        """Move on by a time step towards a wanted twist ``(3,)``; return the wheels' speeds ``(n,)``."""
         wanted = np.asarray(wanted, dtype=float)
         acceleration = self._towards(wanted, dt)
         if self.steer_first and self._fastest(self.twist) < REST_SPEED:
             if self._fastest(wanted) < REST_SPEED:
                 self.state[3:] = 0.0  # what is left is less than any wheel would turn for
-                return
+                return np.zeros(len(self.positions))
             turn, backward = self._turn(wanted)
             if np.abs(turn).max() > self.limits.aligned:
                 self.state[3:] = 0.0
                 self._steer(turn, backward, dt)
-                return
+                return np.zeros(len(self.positions))
         self._move(acceleration, dt)
+        return (constraint_matrix(self.steering, self.positions) @ self.twist)[len(self.positions) :]
 
     def drive(self, wanted: np.ndarray, duration: float, dt: float = 0.01) -> Drive:
         """Follow a wanted twist, ``(3,)``, or one for each step, ``(N, 3)``, and return what happened."""
@@ -114,16 +122,19 @@ class Base:
             poses.append(self.state.copy())
             angles.append(self.steering.copy())
         states, steering = np.array(poses), np.array(angles)
-        velocity = np.array([wheel_velocities(twist, self.positions) for twist in states[:, 3:]])
-        along = np.stack([np.cos(steering), np.sin(steering)], axis=2)
-        across = np.stack([-np.sin(steering), np.cos(steering)], axis=2)
+        wheels = np.array(
+            [
+                constraint_matrix(row, self.positions) @ twist
+                for row, twist in zip(steering, states[:, 3:], strict=True)
+            ]
+        )
         return Drive(
             t=dt * np.arange(steps + 1),
             pose=states[:, :3],
             twist=states[:, 3:],
             steering=steering,
-            speed=np.sum(velocity * along, axis=2),
-            skid=np.sum(velocity * across, axis=2),
+            speed=wheels[:, len(self.positions) :],
+            skid=wheels[:, : len(self.positions)],
         )
 
     def _towards(self, wanted: np.ndarray, dt: float) -> np.ndarray:

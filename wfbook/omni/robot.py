@@ -80,7 +80,7 @@ HAND_REACH = 0.45
 """Of the hand ahead of the shoulder, in the nominal posture."""
 
 STIFFNESS = np.array(4 * [800.0, 800.0, 80.0, 0.0] + [300.0, 300.0, 200.0, 60.0, 30.0, 10.0, 4.0])
-DAMPING = np.array(4 * [20.0, 20.0, 1.0, 1.0] + [10.0, 10.0, 6.0, 1.5, 0.6, 0.2, 0.06])
+DAMPING = np.array(4 * [20.0, 20.0, 1.0, 2.5] + [10.0, 10.0, 6.0, 1.5, 0.6, 0.2, 0.06])
 """``(23,)`` of the motors' own PD loops: steering holds an angle, wheels a speed. No stiffer than a loop at
 1 kHz can be on joints as light as the wrist, which has no rotors' inertia here."""
 
