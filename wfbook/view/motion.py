@@ -1,13 +1,17 @@
 """What a replay shows of a run or of a plan: everything sampled at the frames of the animation."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from wfbook import go1
 from wfbook.go1 import RADII, WHEEL_RADIUS
 from wfbook.modes import LEGS
+from wfbook.omni import robot as omni
+from wfbook.omni.driving import Driving
 from wfbook.standing import Standing
 from wfbook.terrain import Terrain
 from wfbook.view.spans import SWINGING, plan_modes
@@ -24,7 +28,7 @@ class Motion:
 
     Attributes:
         start: time of the first frame.
-        qpos: (N, 23) MuJoCo configurations.
+        qpos: (N, 23) MuJoCo configurations; (N, 30) of the robot of part II.
         end_effector: (N, 4), 0 foot or 1 wheel.
         modes: (N, 4), 0 stands on its foot, 1 on its wheel, 2 swings.
         contact: (N, 4, 3) lowest point of each leg.
@@ -33,6 +37,9 @@ class Motion:
         measured_com: (N, 3), or None for a plan that nobody has executed.
         terrain: the ground.
         believed: (N, 7) where the robot thinks its trunk is, as in ``qpos``; None if it knows.
+        hand: (N, 3) where the hand is; None for a robot without an arm.
+        model: MJCF of the robot.
+        size: of the robot, the Go1's being 1: so much further away stands the camera.
     """
 
     start: float
@@ -45,6 +52,9 @@ class Motion:
     measured_com: np.ndarray | None
     terrain: Terrain
     believed: np.ndarray | None = None
+    hand: np.ndarray | None = None
+    model: Path = go1.ASSETS / "go1.xml"
+    size: float = 1.0
 
 
 def motion_of_run(run: "Run") -> Motion:
@@ -88,6 +98,28 @@ def motion_of_standing(standing: Standing) -> Motion:
         planned_com=com,
         measured_com=com,
         terrain=standing.terrain,
+    )
+
+
+def motion_of_driving(driving: Driving) -> Motion:
+    """Sample the robot of part II as it drives; what was planned is the way of the undisturbed base."""
+    times = np.arange(driving.t[0], driving.t[-1] + 1e-9, 1.0 / FPS)
+    at = np.clip(np.searchsorted(driving.t, times - 1e-9), 0, len(driving.t) - 1)
+    com = driving.com[at]
+    wheel = np.ones((len(at), len(LEGS)), int)
+    return Motion(
+        start=float(times[0]),
+        qpos=driving.qpos[at],
+        end_effector=wheel,
+        modes=wheel,
+        contact=driving.p[at],
+        force=driving.contact_force[at],
+        planned_com=np.column_stack([driving.pose[at, :2], com[:, 2]]),
+        measured_com=com,
+        terrain=driving.terrain,
+        hand=driving.hand[at],
+        model=omni.ASSETS / "omni.xml",
+        size=1.8,
     )
 
 

@@ -30,6 +30,7 @@ class Player {
     this.playing = false;
     this.seen = false;
     this.previous = null;
+    this.followed = viewer.controls.target.clone().set(0, 0, 0);
     // The bar below takes the place of Meshcat's own folder, which knows nothing of this clock.
     viewer.animator.folder.domElement.style.display = "none";
     viewer.animator.play();
@@ -41,10 +42,24 @@ class Player {
   seek(time) {
     this.time = Math.max(0, Math.min(this.duration, time));
     this.viewer.animator.seek(this.time);
+    this.follow();
     element("time").value = this.time;
     const shown = (value) => (value + this.start).toFixed(2);
     element("clock").textContent = shown(this.time) + " / " + shown(this.duration) + " s";
     this.mark(this.time + this.start);
+  }
+
+  // Camera and target go along with the robot. Moving the camera's parent does not do: it would travel, and go
+  // on looking where the robot was at first.
+  follow() {
+    const { x, y, z } = this.viewer.scene_tree.find(["Follow"]).object.position;
+    const { camera, controls } = this.viewer;
+    const place = this.followed.clone().set(x, z, -y);  // up is z in the scene and y for the camera
+    const step = place.clone().sub(this.followed);
+    this.followed = place;
+    camera.position.add(step);
+    controls.target.add(step);
+    controls.update();
   }
 
   // What stands beside the picture and belongs to a stretch of time is marked while that lasts.

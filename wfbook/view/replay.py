@@ -5,9 +5,10 @@
     SideBySide({"this": a, "that": b})  likewise, in a row
 
 A replay shows the robot with the end effector it uses (green foot, orange wheel), the contact forces, where
-the legs stood and rolled, and the path of the centre of mass. The trunk of a robot that has to estimate where
-it is appears twice: where it is, and, light blue, where it believes to be. A plan can be replayed too, before
-any controller has seen it: then the robot is posed as the plan wants it.
+the legs stood and rolled, and the path of the centre of mass; of the robot of part II also that of the hand.
+The trunk of a robot that has to estimate where it is appears twice: where it is, and, light blue, where it
+believes to be. A plan can be replayed too, before any controller has seen it: then the robot is posed as the
+plan wants it.
 """
 
 import itertools
@@ -21,14 +22,20 @@ import mujoco
 import numpy as np
 from meshcat import Visualizer
 
-from wfbook.go1 import ASSETS
-from wfbook.modes import LEGS
+from wfbook.modes import END_EFFECTORS, LEGS
+from wfbook.omni.driving import Driving
 from wfbook.standing import Standing
 from wfbook.view import scene
 from wfbook.view.meshcat_static import Recorder, frame, page
-from wfbook.view.motion import Motion, motion_of_plan, motion_of_run, motion_of_standing
+from wfbook.view.motion import (
+    Motion,
+    motion_of_driving,
+    motion_of_plan,
+    motion_of_run,
+    motion_of_standing,
+)
 from wfbook.view.spans import SWINGING, spans
-from wfbook.view.style import ESTIMATED, FOOT, FORCE, MEASURED, MODE_COLOURS, PLANNED, WHEEL
+from wfbook.view.style import ESTIMATED, FOOT, FORCE, HAND, MEASURED, MODE_COLOURS, PLANNED, WHEEL
 from wfbook.view.tracks import Tracks
 
 if TYPE_CHECKING:
@@ -39,9 +46,11 @@ _MARGIN = 1.5
 _ARROW_LENGTH = 0.5
 """Length of the arrow of a force as large as the robot's weight."""
 _SMALLEST_FORCE = 1.0
+_STRAIGHT = 0.01
+"""A track is drawn in straight pieces no further than this from where the wheel rolled."""
 
 
-def html(motion: "Run | Plan | Standing", title: str | None = None, beside: str = "") -> str:
+def html(motion: "Run | Plan | Standing | Driving", title: str | None = None, beside: str = "") -> str:
     """Return a self-contained page that replays a run or a plan.
 
     Args:
@@ -50,17 +59,22 @@ def html(motion: "Run | Plan | Standing", title: str | None = None, beside: str 
         beside: HTML beside the picture (see :func:`.meshcat_static.page`).
     """
     shown = _motion_of(motion)
-    legend = {"foot": FOOT, "wheel": WHEEL, "contact force": FORCE}
+    legend = {"foot": FOOT} if shown.hand is None else {}
+    legend |= {"wheel": WHEEL, "contact force": FORCE}
     if _planned(shown):
         legend["CoM planned"] = PLANNED
     if shown.measured_com is not None:
         legend["CoM measured"] = MEASURED
+    if shown.hand is not None:
+        legend["hand"] = HAND
     if shown.believed is not None:
         legend["trunk, as it believes"] = ESTIMATED
     return page(commands(shown), title or f"replay: {shown.terrain.name}", legend, shown.start, beside)
 
 
-def save(motion: "Run | Plan | Standing", path: str | os.PathLike, title: str | None = None) -> None:
+def save(
+    motion: "Run | Plan | Standing | Driving", path: str | os.PathLike, title: str | None = None
+) -> None:
     """Write the page that replays a run or a plan.
 
     Raises:
@@ -78,7 +92,9 @@ class Replay:
         beside: HTML beside the picture (see :func:`.meshcat_static.page`).
     """
 
-    def __init__(self, motion: "Run | Plan | Standing", height: int = 420, beside: str = "") -> None:
+    def __init__(
+        self, motion: "Run | Plan | Standing | Driving", height: int = 420, beside: str = ""
+    ) -> None:
         self._html = frame(html(motion, beside=beside), height)
 
     def _repr_html_(self) -> str:
@@ -107,13 +123,14 @@ def commands(motion: Motion) -> list[dict]:
     """Return Meshcat's commands that draw and animate a motion."""
     recorder = Recorder()
     visualizer, tracks = recorder.visualizer(), Tracks()
-    model = mujoco.MjModel.from_xml_path(str(ASSETS / "go1.xml"))
+    model = mujoco.MjModel.from_xml_path(str(motion.model))
     _stage(visualizer, tracks, motion)
     named = scene.add_robot(visualizer, model)
     _move_bodies(visualizer, tracks, model, motion.qpos)
     for leg, name in enumerate(LEGS):
-        tracks.add(named[f"{name}_foot"], "visible", motion.end_effector[:, leg] == 0)
-        tracks.add(named[f"{name}_wheel"], "visible", motion.end_effector[:, leg] == 1)
+        for kind, end in enumerate(END_EFFECTORS):
+            if f"{name}_{end}" in named:
+                tracks.add(named[f"{name}_{end}"], "visible", motion.end_effector[:, leg] == kind)
     weight = float(model.body_subtreemass[0]) * float(np.linalg.norm(model.opt.gravity))
     _move_arrows(visualizer, tracks, motion, _ARROW_LENGTH / weight)
     _draw_prints(visualizer, motion)
@@ -121,6 +138,8 @@ def commands(motion: Motion) -> list[dict]:
         scene.add_line(visualizer["com/planned"], motion.planned_com, PLANNED)
     if motion.measured_com is not None:
         scene.add_line(visualizer["com/measured"], motion.measured_com, MEASURED)
+    if motion.hand is not None:
+        scene.add_line(visualizer["hand"], motion.hand, HAND)
     if motion.believed is not None:
         scene.add_ghost(visualizer["believed"], model, ESTIMATED)
         tracks.add(visualizer["believed"], "position", motion.believed[:, :3])
@@ -129,10 +148,12 @@ def commands(motion: Motion) -> list[dict]:
     return recorder.commands
 
 
-def _motion_of(motion: "Run | Plan | Standing") -> Motion:
+def _motion_of(motion: "Run | Plan | Standing | Driving") -> Motion:
     """Sample whatever moves."""
     if isinstance(motion, Standing):
         return motion_of_standing(motion)
+    if isinstance(motion, Driving):
+        return motion_of_driving(motion)
     return motion_of_run(motion) if hasattr(motion, "qpos") else motion_of_plan(motion)
 
 
@@ -151,10 +172,10 @@ def _stage(visualizer: Visualizer, tracks: Tracks, motion: Motion) -> None:
     low, high = path[:, :2].min(axis=0) - _MARGIN, path[:, :2].max(axis=0) + _MARGIN
     scene.add_light(visualizer["/Lights"], reach=float(np.abs([low, high]).max()))
     scene.add_terrain(visualizer, motion.terrain, low, high)
-    # Meshcat's camera turns about the origin of its parent node, and in its own frame y is up.
-    tracks.add(visualizer["/Cameras/default"], "position", path * [1.0, 1.0, 0.6])
+    # Where the camera looks; player.js makes it go along. In the camera's own frame y is up.
+    tracks.add(visualizer["/Follow"], "position", path * [1.0, 1.0, 0.6])
     camera = visualizer["/Cameras/default/rotated/<object>"]
-    camera.set_property("position", [0.9, 0.9, 1.9])
+    camera.set_property("position", [motion.size * x for x in (0.9, 0.9, 1.9)])
     camera.set_property("zoom", 2.2)
 
 
@@ -205,7 +226,20 @@ def _draw_prints(visualizer: Visualizer, motion: Motion) -> None:
         for first, after in itertools.pairwise([0, *kinks, len(path)]):
             region = regions[first]
             normal = [0.0, 0.0, 1.0] if region is None else terrain.regions[region].normal
-            last = path[after - 1] if mode == 1 else path[first]
-            node = visualizer["prints"][f"{LEGS[leg]} {count}"]
-            scene.add_print(node, path[first], last, normal, MODE_COLOURS[mode])
-            count += 1
+            ends = first + _bends(path[first:after]) if mode == 1 else np.array([first, first])
+            for start_of, end_of in itertools.pairwise(ends):
+                node = visualizer["prints"][f"{LEGS[leg]} {count}"]
+                scene.add_print(node, path[start_of], path[end_of], normal, MODE_COLOURS[mode])
+                count += 1
+
+
+def _bends(path: np.ndarray) -> np.ndarray:
+    """Return the indices of those points ``(n, 3)`` whose polygon is nowhere far off a path."""
+    last = len(path) - 1
+    chord = path[-1] - path[0]
+    along = (path - path[0]) @ chord / max(float(chord @ chord), 1e-12)
+    away = np.linalg.norm(path - path[0] - np.clip(along, 0.0, 1.0)[:, None] * chord, axis=1)
+    worst = int(away.argmax())
+    if away[worst] <= _STRAIGHT:
+        return np.array([0, last])
+    return np.concatenate([_bends(path[: worst + 1])[:-1], worst + _bends(path[worst:])])

@@ -76,7 +76,7 @@ def add_robot(visualizer: Visualizer, model: mujoco.MjModel) -> dict[str, Visual
         node = nodes[body]["geoms"][name]
         rotation = np.empty(9)
         mujoco.mju_quat2Mat(rotation, geom.quat)
-        node.set_transform(pose(geom.pos, rotation.reshape(3, 3)))
+        node.set_transform(pose(geom.pos, rotation.reshape(3, 3) @ _upright(model, i)))
         if name.endswith("_foot"):
             # A little larger than it is, else the calf's mesh hides it.
             node.set_object(
@@ -87,7 +87,7 @@ def add_robot(visualizer: Visualizer, model: mujoco.MjModel) -> dict[str, Visual
             node["tyre"].set_object(
                 _geometry(model, i), material(WHEEL, emissive=hex_to_int(WHEEL), emissiveIntensity=_GLOW)
             )
-            node["spoke"].set_object(_spoke(geom.size), material(INK))
+            node["spoke"].set_object(_spoke(model, i), material(INK))
         else:
             node.set_object(_geometry(model, i), material(BODY))
         named[name] = node
@@ -103,7 +103,7 @@ def add_ghost(node: Visualizer, model: mujoco.MjModel, colour: str) -> None:
         rotation = np.empty(9)
         mujoco.mju_quat2Mat(rotation, model.geom_quat[i])
         part = node[f"geom{i}"]
-        part.set_transform(pose(model.geom_pos[i], 1.04 * rotation.reshape(3, 3)))
+        part.set_transform(pose(model.geom_pos[i], 1.04 * rotation.reshape(3, 3) @ _upright(model, int(i))))
         part.set_object(_geometry(model, int(i)), material(colour, transparent=True, opacity=0.5))
 
 
@@ -116,6 +116,8 @@ def _geometry(model: mujoco.MjModel, index: int) -> g.Geometry:
         return g.Ellipsoid(size.tolist())
     if kind == mujoco.mjtGeom.mjGEOM_BOX:
         return g.Box((2.0 * size).tolist())
+    if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        return g.Cylinder(2.0 * float(size[1]), float(size[0]))
     if kind == mujoco.mjtGeom.mjGEOM_MESH:
         mesh = model.mesh(int(model.geom_dataid[index]))
         vertices = model.mesh_vert[mesh.vertadr[0] :][: mesh.vertnum[0]]
@@ -124,9 +126,17 @@ def _geometry(model: mujoco.MjModel, index: int) -> g.Geometry:
     raise ValueError(f"geom {model.geom(index).name!r}: type {kind.name} can't be drawn in a replay")
 
 
-def _spoke(size: np.ndarray) -> g.Geometry:
+def _upright(model: mujoco.MjModel, index: int) -> np.ndarray:
+    """Return the rotation (3, 3) from Meshcat's axes of a shape to MuJoCo's: its cylinders stand along y."""
+    if int(model.geom_type[index]) == mujoco.mjtGeom.mjGEOM_CYLINDER:
+        return np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+    return np.eye(3)
+
+
+def _spoke(model: mujoco.MjModel, index: int) -> g.Geometry:
     """Return a bar across a wheel, as thick as its axle: a plain disc would not show that it rolls."""
-    return g.Box([1.7 * float(size[0]), 2.02 * float(size[1]), 0.3 * float(size[2])])
+    radius, half, _ = model.geom_size[index].tolist()
+    return g.Box([1.7 * radius, 2.02 * half, 0.3 * radius])
 
 
 def add_arrow(node: Visualizer, colour: str) -> None:

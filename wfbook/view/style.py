@@ -21,6 +21,7 @@ INK = "#222222"
 BODY = "#8A919C"
 PALE = "#BBBBBB"
 LIMIT = "#D55E00"  # what may not be crossed, and what crosses it: red says stop
+HAND = "#882255"  # where an arm's hand is; wine, after Tol: Okabe and Ito's eight are spoken for
 RELAXED = "#F0E442"  # what a relaxation allows besides the truth: the one hue that nothing else has
 
 SWINGING = 2
