@@ -290,4 +290,8 @@ def test_a_browser_plays_the_file(tmp_path, run):
         page.wait_for_selector("body[data-state=ready]", state="attached", timeout=60e3)
         assert re.fullmatch(r"0\.50 / 1\.4\d s", page.inner_text("#clock")), "the clock did not start there"
         assert page.is_hidden("#message"), "an error message is shown"
+        looks_at = page.evaluate("(({x, y, z}) => [x, -z, y])(window.replay.viewer.controls.target)")
+        motion = motion_of_run(run)
+        there = motion.planned_com[round(FPS * (0.5 - motion.start))] * [1.0, 1.0, 0.6]
+        assert np.allclose(looks_at, there, atol=0.01), "the camera does not look at the robot"
         browser.close()
