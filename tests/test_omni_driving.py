@@ -9,7 +9,6 @@ from test_view_replay import tracks_of
 
 from wfbook.modes import LEGS
 from wfbook.omni import robot
-from wfbook.omni.base import Base
 from wfbook.omni.driving import drive, holding_torques
 from wfbook.omni.robot import Omni
 from wfbook.omni.wheels import crab, rotation
@@ -59,12 +58,9 @@ def test_holding_torques_hold():
     assert omni.hand[0][2] > without.hand[0][2] + 0.005
 
 
-def test_a_base_that_does_not_wait_shakes_its_hand():
-    wanted = crab(0.8, np.pi / 2)
-    patient, hasty = drive(wanted, 1.5), drive(wanted, 1.5, Base(steer_first=False))
-    off = [np.abs(d.hand[:, 2] - robot.HAND_HEIGHT).max() for d in (patient, hasty)]
-    assert off[0] < 0.005
-    assert off[1] > 5 * off[0]
+def test_the_ground_goes_on(driving):
+    far = drive(crab(1.2, np.pi / 2), 4.0)
+    assert far.qpos[-1, 1] > 2.5 and abs(far.qpos[-1, 2] - robot.NOMINAL_HEIGHT) < 0.01
 
 
 def test_the_replay_moves_every_body_as_the_simulation_did(driving):

@@ -13,7 +13,7 @@ from wfbook.modes import LEGS
 from wfbook.omni.base import Base
 from wfbook.omni.robot import NU, NV, STEERS_V, WHEEL_RADIUS, WHEELS_V, Omni, OmniDynamics, contact_offsets
 from wfbook.omni.robot import posture as nominal_posture
-from wfbook.terrain import flat
+from wfbook.standing import plane
 
 if TYPE_CHECKING:
     from wfbook.terrain import Terrain
@@ -22,6 +22,7 @@ _TICK = 5
 """Milliseconds from one command to the wheels to the next."""
 _SAMPLE = 10
 _SETTLE = 300
+_FRICTION = 0.7
 _UP = np.tile([0.0, 0.0, 1.0], (4, 1))
 
 
@@ -84,11 +85,11 @@ def drive(
         twists: ``(k, 3)`` wanted one after the other, each for the same time; or one, ``(3,)``.
         duration: of all together.
         base: that turns what is wanted into commands; its state is changed. A new one without it.
-        terrain: level ground without it.
+        terrain: without it a large level plane with a friction of 0.7.
     """
     twists = np.atleast_2d(np.asarray(twists, dtype=float))
     base = Base() if base is None else base
-    robot = Omni(flat() if terrain is None else terrain)
+    robot = Omni(plane(_FRICTION) if terrain is None else terrain)
     qpos = nominal_posture()
     qpos[1 + STEERS_V] = base.steering
     robot.reset(qpos)
