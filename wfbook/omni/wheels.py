@@ -208,8 +208,9 @@ def connection(steering: np.ndarray, positions: np.ndarray, radius: float) -> np
 
     Its first n columns are zero: turning a wheel about its own middle moves nothing. The paper's proof ends
     with rank three from rank S = 3 and rank B = 4, from which it follows only that it is *at most* three.
-    It is for most steering angles; but with all wheels parallel, which is driving straight and crabbing, it
-    is two: no spins turn the body. And rank three is not yet freedom: see :func:`free_twists`.
+    It is, for most steering angles; but with all wheels parallel, which is driving straight and crabbing,
+    it is two: no spins move the body across the wheels. And rank three is not yet freedom: see
+    :func:`free_twists`.
     """
     n = len(positions)
     B = np.diag(np.concatenate([np.zeros(n), np.full(n, radius)]))
