@@ -45,6 +45,17 @@ def test_the_ground_carries_the_robot(driving):
     assert np.abs(driving.p[:, :, 2]).max() < 0.005
 
 
+def test_straight_across_the_ground_while_it_turns():
+    def wanted(t, pose):
+        cos, sin = np.cos(pose[2]), np.sin(pose[2])
+        return np.array([0.5 * cos, -0.5 * sin, 1.0])  # 0.5 m/s along the world's x
+
+    spun = drive(wanted, 5.0)
+    assert spun.yaw[-1] > 4.0
+    assert spun.qpos[-1, 0] > 1.9
+    assert np.abs(spun.qpos[:, 1]).max() < 0.15
+
+
 def test_holding_torques_hold():
     omni, torques = Omni(flat()), holding_torques(robot.posture())
     angles = robot.posture()[7:]

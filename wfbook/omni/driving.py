@@ -4,6 +4,7 @@ No controller knows of contact forces here, and nobody corrects the course: what
 from the base's arithmetic is what friction, inertia and the springs of the legs do to it.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -17,6 +18,8 @@ from wfbook.standing import plane
 
 if TYPE_CHECKING:
     from wfbook.terrain import Terrain
+
+Wanted = np.ndarray | Callable[[float, np.ndarray], np.ndarray]
 
 _TICK = 5
 """Milliseconds from one command to the wheels to the next."""
@@ -77,17 +80,24 @@ def holding_torques(qpos: np.ndarray) -> np.ndarray:
 
 
 def drive(
-    twists: np.ndarray, duration: float, base: Base | None = None, terrain: "Terrain | None" = None
+    wanted: Wanted, duration: float, base: Base | None = None, terrain: "Terrain | None" = None
 ) -> Driving:
     """Let the robot follow wanted twists, from rest.
 
     Args:
-        twists: ``(k, 3)`` wanted one after the other, each for the same time; or one, ``(3,)``.
+        wanted: twists ``(k, 3)`` one after the other, each for the same time; or one, ``(3,)``; or a function
+            from the time and the base's pose ``(3,)`` to a twist.
         duration: of all together.
         base: that turns what is wanted into commands; its state is changed. A new one without it.
         terrain: without it a large level plane with a friction of 0.7.
     """
-    twists = np.atleast_2d(np.asarray(twists, dtype=float))
+    steps = round(1000 * duration)
+    if not callable(wanted):
+        twists = np.atleast_2d(np.asarray(wanted, dtype=float))
+
+        def wanted(t: float, _pose: np.ndarray) -> np.ndarray:
+            return twists[min(int(t / duration * len(twists) + 1e-9), len(twists) - 1)]
+
     base = Base() if base is None else base
     robot = Omni(plane(_FRICTION) if terrain is None else terrain)
     qpos = nominal_posture()
@@ -95,11 +105,9 @@ def drive(
     robot.reset(qpos)
     angles, rates, torques = qpos[7:].copy(), np.zeros(NU), holding_torques(qpos)
     samples = []
-    steps = round(1000 * duration)
     for step in range(-_SETTLE, steps):
         if step >= 0 and step % _TICK == 0:
-            wanted = twists[min(step * len(twists) // steps, len(twists) - 1)]
-            speed = base.advance(wanted, _TICK / 1000)
+            speed = base.advance(wanted(step / 1000, base.state[:3].copy()), _TICK / 1000)
             angles[STEERS_V - 6] = base.steering
             rates[WHEELS_V - 6] = speed / WHEEL_RADIUS
         robot.step(robot.servo(angles, rates, torques))
