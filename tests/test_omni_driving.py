@@ -53,7 +53,7 @@ def test_straight_across_the_ground_while_it_turns():
     spun = drive(wanted, 5.0)
     assert spun.yaw[-1] > 4.0
     assert spun.qpos[-1, 0] > 1.9
-    assert np.abs(spun.qpos[:, 1]).max() < 0.15
+    assert np.abs(spun.qpos[:, 1]).max() < 0.25
 
 
 def test_holding_torques_hold():

@@ -108,6 +108,7 @@ def drive(
     for step in range(-_SETTLE, steps):
         if step >= 0 and step % _TICK == 0:
             speed = base.advance(wanted(step / 1000, base.state[:3].copy()), _TICK / 1000)
+            rates[STEERS_V - 6] = 1000 / _TICK * (base.steering - angles[STEERS_V - 6])
             angles[STEERS_V - 6] = base.steering
             rates[WHEELS_V - 6] = speed / WHEEL_RADIUS
         robot.step(robot.servo(angles, rates, torques))
