@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from wfbook.modes import LEGS
 from wfbook.omni import robot
+from wfbook.omni.driving import holding_torques
 from wfbook.omni.robot import ASSETS, NQ, NU, NV, Omni, OmniDynamics
 from wfbook.terrain import flat
 
@@ -268,3 +269,22 @@ def test_building_the_assets_again_gives_the_same_bytes(tmp_path):
 def test_pinocchio_reads_the_sites_as_frames(dynamics):
     for frame in FRAMES:
         assert dynamics.model.existFrame(frame, pin.FrameType.OP_FRAME), frame
+
+
+def test_it_stands_without_jitter_and_coasts_without_resistance():
+    omni = Omni(flat())
+    posture, torques = robot.posture(), holding_torques(robot.posture())
+    forces = []
+    for step in range(1200):
+        omni.step(omni.servo(posture[7:], np.zeros(NU), torques))
+        if step >= 1000:
+            forces.append(omni.contact_wrenches()[:, 2])
+    assert np.std(forces, axis=0).max() < 0.01
+    qvel = np.zeros(NV)
+    qvel[0], qvel[robot.WHEELS_V] = 1.0, 1.0 / robot.WHEEL_RADIUS
+    omni.reset(omni.data.qpos.copy(), qvel)
+    for _ in range(2000):
+        motors = omni.servo(posture[7:], np.zeros(NU), torques)
+        motors[robot.WHEELS_V - 6] = 0.0
+        omni.step(motors)
+    assert omni.data.qvel[0] == pytest.approx(1.0, abs=2e-3)
