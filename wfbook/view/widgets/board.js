@@ -109,7 +109,10 @@ function render({ model, el }) {
       const [left, right, low, high] = model.get("_limits");
       const share = event.shiftKey ? 0.1 : 0.02;
       const [x, y] = points()[name];
-      move(name, [x + share * step[0] * (right - left), y + share * step[1] * (high - low)]);
+      // An axis may run from right to left: a key moves the handle where it points.
+      const [x0, y0, x1, y1] = model.get("_frame");
+      const along = Math.sign(x1 - x0) * step[0], up = Math.sign(y0 - y1) * step[1];
+      move(name, [x + share * along * (right - left), y + share * up * (high - low)]);
     });
     return handle;
   }
