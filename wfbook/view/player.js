@@ -31,8 +31,8 @@ class Player {
     this.seen = false;
     this.previous = null;
     this.followed = viewer.controls.target.clone().set(0, 0, 0);
-    // The bar below takes the place of Meshcat's own folder, which knows nothing of this clock.
-    viewer.animator.folder.domElement.style.display = "none";
+    // The bar below takes the place of Meshcat's own controls, which know nothing of this clock.
+    viewer.gui.domElement.style.display = "none";
     viewer.animator.play();
     viewer.animator.pause();
     this.connectBar();
