@@ -2,16 +2,11 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from wfbook.exercises import WrongAnswer
 from wfbook.exercises import planning as check
 from wfbook.planner import Weights
-
-
-def least(a, b, low, high):
-    return max(np.maximum(a * low, a * high).sum() - b, 0.0)
 
 
 def left(bounds, incumbent, gap):
@@ -35,26 +30,6 @@ def test_who_is_to_blame():
 def test_wrong_blame(blamed, message):
     with pytest.raises(WrongAnswer, match=message):
         check.conflict(blamed)
-
-
-def test_the_smallest_m():
-    assert check.smallest_big_m(least).startswith("Right")
-
-
-@pytest.mark.parametrize(
-    ("function", "message"),
-    [
-        (lambda a, b, low, high: 100.0, "larger than needed"),
-        (lambda a, b, low, high: max(float(a @ high - b), 0.0), "too small. At z = 0 it cuts off y ="),
-        (lambda a, b, low, high: np.maximum(a * low, a * high).sum() - b, "is negative"),
-        (lambda a, b, low, high: least(a, b, low, high) + abs(b), "larger than needed"),
-        (lambda a, b, low, high: a, "M has the shape"),
-        (None, "not a function"),
-    ],
-)
-def test_wrong_m(function, message):
-    with pytest.raises(WrongAnswer, match=message):
-        check.smallest_big_m(function)
 
 
 def test_what_is_left():

@@ -85,44 +85,6 @@ def conflict(blamed: Iterable[str]) -> str:
     return f"Right. The planner says: {said}"
 
 
-def smallest_big_m(function: Callable[..., Any], seed: int = 5) -> str:
-    """Check a function that returns the smallest M of an implication.
-
-    Args:
-        function: ``function(a, b, low, high)`` returns the least M ≥ 0 for which ``a · y ≤ b + M (1 − z)``
-            says nothing at z = 0, for y anywhere in the box from ``low`` to ``high``.
-        seed: of the boxes that are tried.
-
-    Raises:
-        WrongAnswer: an M cuts off a point of the box, or is larger than needed.
-    """
-    rng = np.random.default_rng(seed)
-    for trial in range(30):
-        n = int(rng.integers(1, 4))
-        a = rng.normal(size=n).round(2)
-        low = rng.normal(size=n).round(2)
-        high = low + rng.uniform(0.1, 2.0, n).round(2)
-        corners = np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(n, -1).T
-        worst = corners[(corners @ a).argmax()]
-        b = float(np.round(worst @ a - rng.uniform(0.1, 1.0), 2))
-        if trial == 0:
-            b = float(worst @ a + 0.5)  # the box never breaks the rule
-        M = number(called(function, a, b, low, high, name="smallest_m"), "M")
-        least = max(float(worst @ a - b), 0.0)
-        where = f"a = {a}, b = {b:.2f}, box from {low} to {high}"
-        if M < 0.0:
-            raise WrongAnswer(f"{where}: M = {M:.3f} is negative; a rule that can't be broken needs M = 0")
-        if least - 1e-9 > M:
-            raise WrongAnswer(
-                f"{where}: M = {M:.3f} is too small. At z = 0 it cuts off y = {worst}, "
-                f"where a · y = {worst @ a:.3f} > b + M"
-            )
-        if least + 1e-9 < M:
-            reason = "the box alone keeps a · y ≤ b" if least == 0.0 else f"{least:.3f} is enough"
-            raise WrongAnswer(f"{where}: M = {M:.3f} is larger than needed, {reason}; the bound pays for it")
-    return "Right: 30 boxes, and no point of any is cut off at z = 0, with nothing to spare."
-
-
 def what_is_left(function: Callable[..., Any], seed: int = 3) -> str:
     """Check the bookkeeping of branch and bound.
 
