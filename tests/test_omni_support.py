@@ -186,3 +186,19 @@ def test_wrong_areas(arguments, message):
         support_area(wheels(), **arguments)
     with pytest.raises(ValueError, match="contacts: there is none"):
         support_area([])
+
+
+def test_where_the_pendular_area_ends_nothing_balances():
+    contacts = wheels(0.3)
+    com = np.array([0.1, 0.05, 0.45])
+    area = support_area(contacts, "pendular", com)
+    middle = area.mean(axis=0)
+    for corner in area:
+        for share, holds in ((0.999, True), (1.001, False)):
+            point = middle + share * (corner - middle)
+            acceleration = np.array(
+                [*(com[:2] - point) / com[2], 0.0]
+            )  # of the linear pendulum, in units of g
+            outside = gravity_wrench(com, acceleration, 300.0)
+            assert zmp(-outside) == pytest.approx(point)
+            assert (balance(contacts, outside) is not None) == holds

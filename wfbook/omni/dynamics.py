@@ -1,4 +1,7 @@
-"""Chapter 10: how the robot accelerates while its wheels keep to the ground (Paper B, eqs 2 to 5).
+"""Chapter 10: how the robot accelerates while its wheels keep to the ground (Paper B, eqs 1 to 5).
+
+The configuration is that of eq. 1: trunk, legs, arm. What the paper calls the centre of mass there, ``r_WB``,
+is the origin of the trunk's frame.
 
 Eq. 4 asks for accelerations and contact forces at once. It has one answer if no contact row follows from the
 others. The legs have no abduction, so four wheels that are each held in all three directions are too much:
@@ -131,7 +134,7 @@ def constrained(
     """Solve Paper B, eq. 4, for accelerations and contact forces.
 
     By elimination: ``(J M⁻¹ Jᵀ + damping) f = −J̇ q̇ − J M⁻¹ (Sᵀ u − h)``, then ``q̈`` from eq. 2. Without
-    contacts it is eq. 5.
+    contacts it is Paper B, eq. 5.
 
     Args:
         M: ``(29, 29)`` mass matrix.
