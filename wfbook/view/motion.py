@@ -12,8 +12,10 @@ from wfbook.go1 import RADII, WHEEL_RADIUS
 from wfbook.modes import LEGS
 from wfbook.omni import robot as omni
 from wfbook.omni.driving import Driving
+from wfbook.omni.tipping import Tipping
 from wfbook.standing import Standing
 from wfbook.terrain import Terrain
+from wfbook.view.balance import Balance, balance_of
 from wfbook.view.spans import SWINGING, plan_modes
 from wfbook.view.tracks import FPS
 
@@ -40,6 +42,7 @@ class Motion:
         hand: (N, 3) where the hand is; None for a robot without an arm.
         model: MJCF of the robot.
         size: of the robot, the Go1's being 1: so much further away stands the camera.
+        balance: zero-moment point and push of a robot that is pushed, or None.
     """
 
     start: float
@@ -55,6 +58,7 @@ class Motion:
     hand: np.ndarray | None = None
     model: Path = go1.ASSETS / "go1.xml"
     size: float = 1.0
+    balance: Balance | None = None
 
 
 def motion_of_run(run: "Run") -> Motion:
@@ -120,6 +124,27 @@ def motion_of_driving(driving: Driving) -> Motion:
         hand=driving.hand[at],
         model=omni.ASSETS / "omni.xml",
         size=1.8,
+    )
+
+
+def motion_of_tipping(tipping: Tipping) -> Motion:
+    """Sample the robot of part II that is pushed over."""
+    times = np.arange(tipping.t[0], tipping.t[-1] + 1e-9, 1.0 / FPS)
+    at = np.clip(np.searchsorted(tipping.t, times - 1e-9), 0, len(tipping.t) - 1)
+    com, wheel = tipping.com[at], np.ones((len(at), len(LEGS)), int)
+    return Motion(
+        start=float(times[0]),
+        qpos=tipping.qpos[at],
+        end_effector=wheel,
+        modes=np.where(tipping.lifted[at], SWINGING, wheel),
+        contact=tipping.contact[at],
+        force=tipping.contact_force[at],
+        planned_com=com,
+        measured_com=com,
+        terrain=tipping.terrain,
+        model=omni.ASSETS / "omni.xml",
+        size=1.8,
+        balance=balance_of(tipping, at),
     )
 
 

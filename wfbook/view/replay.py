@@ -6,6 +6,7 @@
 
 A replay shows the robot with the end effector it uses (green foot, orange wheel), the contact forces, where
 the legs stood and rolled, and the path of the centre of mass; of the robot of part II also that of the hand.
+Of a robot that is pushed over also the push, the zero-moment point and the area that it must not leave.
 The trunk of a robot that has to estimate where it is appears twice: where it is, and, light blue, where it
 believes to be. A plan can be replayed too, before any controller has seen it: then the robot is posed as the
 plan wants it.
@@ -24,8 +25,10 @@ from meshcat import Visualizer
 
 from wfbook.modes import END_EFFECTORS, LEGS
 from wfbook.omni.driving import Driving
+from wfbook.omni.tipping import Tipping
 from wfbook.standing import Standing
 from wfbook.view import scene
+from wfbook.view.balance import draw_balance
 from wfbook.view.meshcat_static import Recorder, frame, page
 from wfbook.view.motion import (
     Motion,
@@ -33,9 +36,21 @@ from wfbook.view.motion import (
     motion_of_plan,
     motion_of_run,
     motion_of_standing,
+    motion_of_tipping,
 )
 from wfbook.view.spans import SWINGING, spans
-from wfbook.view.style import ESTIMATED, FOOT, FORCE, HAND, MEASURED, MODE_COLOURS, PLANNED, WHEEL
+from wfbook.view.style import (
+    ESTIMATED,
+    FOOT,
+    FORCE,
+    HAND,
+    INK,
+    LIMIT,
+    MEASURED,
+    MODE_COLOURS,
+    PLANNED,
+    WHEEL,
+)
 from wfbook.view.tracks import Tracks
 
 if TYPE_CHECKING:
@@ -50,7 +65,9 @@ _STRAIGHT = 0.01
 """A track is drawn in straight pieces no further than this from where the wheel rolled."""
 
 
-def html(motion: "Run | Plan | Standing | Driving", title: str | None = None, beside: str = "") -> str:
+def html(
+    motion: "Run | Plan | Standing | Driving | Tipping", title: str | None = None, beside: str = ""
+) -> str:
     """Return a self-contained page that replays a run or a plan.
 
     Args:
@@ -69,11 +86,13 @@ def html(motion: "Run | Plan | Standing | Driving", title: str | None = None, be
         legend["hand"] = HAND
     if shown.believed is not None:
         legend["trunk, as it believes"] = ESTIMATED
+    if shown.balance is not None:
+        legend |= {"zero-moment point": FORCE, "area of support": LIMIT, "push": INK}
     return page(commands(shown), title or f"replay: {shown.terrain.name}", legend, shown.start, beside)
 
 
 def save(
-    motion: "Run | Plan | Standing | Driving", path: str | os.PathLike, title: str | None = None
+    motion: "Run | Plan | Standing | Driving | Tipping", path: str | os.PathLike, title: str | None = None
 ) -> None:
     """Write the page that replays a run or a plan.
 
@@ -93,7 +112,7 @@ class Replay:
     """
 
     def __init__(
-        self, motion: "Run | Plan | Standing | Driving", height: int = 420, beside: str = ""
+        self, motion: "Run | Plan | Standing | Driving | Tipping", height: int = 420, beside: str = ""
     ) -> None:
         self._html = frame(html(motion, beside=beside), height)
 
@@ -144,16 +163,20 @@ def commands(motion: Motion) -> list[dict]:
         scene.add_ghost(visualizer["believed"], model, ESTIMATED)
         tracks.add(visualizer["believed"], "position", motion.believed[:, :3])
         tracks.add(visualizer["believed"], "quaternion", motion.believed[:, 3:])
+    if motion.balance is not None:
+        draw_balance(visualizer["balance"], tracks, motion.balance)
     tracks.play(visualizer)
     return recorder.commands
 
 
-def _motion_of(motion: "Run | Plan | Standing | Driving") -> Motion:
+def _motion_of(motion: "Run | Plan | Standing | Driving | Tipping") -> Motion:
     """Sample whatever moves."""
     if isinstance(motion, Standing):
         return motion_of_standing(motion)
     if isinstance(motion, Driving):
         return motion_of_driving(motion)
+    if isinstance(motion, Tipping):
+        return motion_of_tipping(motion)
     return motion_of_run(motion) if hasattr(motion, "qpos") else motion_of_plan(motion)
 
 
@@ -199,17 +222,19 @@ def _move_bodies(visualizer: Visualizer, tracks: Tracks, model: mujoco.MjModel, 
 
 
 def _move_arrows(visualizer: Visualizer, tracks: Tracks, motion: Motion, scale: float) -> None:
-    """Animate one arrow a leg: it starts at the contact, points along the force and is as long."""
-    for leg, name in enumerate(LEGS):
+    """Animate one arrow a leg, and one for a push: it starts where the force acts and is as long."""
+    arrows = {name: (motion.force[:, leg], motion.contact[:, leg], FORCE) for leg, name in enumerate(LEGS)}
+    if motion.balance is not None:
+        arrows["push"] = (motion.balance.push, motion.balance.at, INK)
+    for name, (force, place, colour) in arrows.items():
         node = visualizer["forces"][name]
-        scene.add_arrow(node, FORCE)
-        force = motion.force[:, leg]
+        scene.add_arrow(node, colour)
         size = np.linalg.norm(force, axis=1)
         pushing = size > _SMALLEST_FORCE
         tracks.add(node, "visible", pushing)
         direction = np.where(pushing[:, None], force, [0.0, 0.0, 1.0])
         length = np.where(pushing, scale * size, 1e-3)
-        tracks.add(node, "position", np.where(pushing[:, None], motion.contact[:, leg], 0.0))
+        tracks.add(node, "position", np.where(pushing[:, None], place, 0.0))
         tracks.add(node, "quaternion", scene.aligning(direction))
         tracks.add(node, "scale", np.column_stack((np.ones_like(length), length, np.ones_like(length))))
 

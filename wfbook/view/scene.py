@@ -147,6 +147,19 @@ def add_arrow(node: Visualizer, colour: str) -> None:
     node["head"].set_transform(pose([0.0, 0.9, 0.0]))
 
 
+def add_ball(node: Visualizer, colour: str, radius: float = 0.022) -> None:
+    """Draw a ball that is seen through everything else."""
+    node.set_object(g.Sphere(radius), signal(colour))
+
+
+def add_rod(node: Visualizer, start: np.ndarray, stop: np.ndarray, colour: str) -> None:
+    """Draw a thin rod between two points (3,), where a line one pixel wide would be lost."""
+    node.set_object(g.Cylinder(float(np.linalg.norm(stop - start)), 0.004), material(colour))
+    turn = np.empty(9)
+    mujoco.mju_quat2Mat(turn, aligning((stop - start)[None])[0])
+    node.set_transform(pose(0.5 * (start + stop), turn.reshape(3, 3)))
+
+
 def add_line(node: Visualizer, points: np.ndarray, colour: str) -> None:
     """Draw a line through points (N, 3)."""
     geometry = g.PointsGeometry(np.asarray(points, dtype=np.float32).T)
