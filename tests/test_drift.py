@@ -8,10 +8,10 @@ import pytest
 
 from wfbook import terrain
 from wfbook.drift import SLACK, Drift
+from wfbook.flights import interpolate
 from wfbook.forecast import expected_state
 from wfbook.planner import Problem
 from wfbook.simulate import run
-from wfbook.tracking import interpolate
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -13,9 +13,9 @@ ROOT = Path(wfbook.__file__).parent
 ORDER = (
     "archive", "polygon", "terrain", "centroidal", "swing", "modes", "leg_path", "friction", "planner",
     "go1", "go1_dynamics", "standing", "reference", "qp", "wbc", "stance", "kalman", "sensors",
-    "leg_odometry", "estimator", "recording", "ideal", "footing", "lean", "drift", "tracking", "runs",
-    "simulate", "forecast", "receding", "omni", "view", "report", "results", "arguments", "quoted", "table2",
-    "study", "paper", "exercises", "__main__",
+    "leg_odometry", "estimator", "recording", "ideal", "flights", "footing", "lean", "drift", "tracking",
+    "runs", "simulate", "forecast", "receding", "omni", "view", "report", "results", "arguments", "quoted",
+    "table2", "study", "paper", "exercises", "__main__",
 )  # fmt: skip
 """The modules and packages, helpers before the chapter that they serve."""
 

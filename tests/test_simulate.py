@@ -6,6 +6,7 @@ import handmade
 import numpy as np
 import pytest
 
+from wfbook.flights import interpolate, swings_of
 from wfbook.go1 import nominal
 from wfbook.modes import LEGS
 from wfbook.reference import Gains
@@ -13,7 +14,7 @@ from wfbook.runs import TIMINGS
 from wfbook.sensors import SensorNoise
 from wfbook.simulate import Run, run
 from wfbook.terrain import Region, Terrain, flat
-from wfbook.tracking import Tracker, interpolate, swings_of
+from wfbook.tracking import Tracker
 
 
 @pytest.fixture(scope="module")

@@ -15,12 +15,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wfbook.drift import excess, pace_of
+from wfbook.flights import interpolate
 from wfbook.go1 import RADII
 from wfbook.go1_dynamics import Go1Dynamics
 from wfbook.planner.problem import InitialState, Problem
 from wfbook.planner.windows import state_after
 from wfbook.reference import Gains
-from wfbook.tracking import Tracker, interpolate
+from wfbook.tracking import Tracker
 
 if TYPE_CHECKING:
     from wfbook.planner.plan import Plan

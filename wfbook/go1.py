@@ -265,6 +265,18 @@ def momenta(qpos: np.ndarray, qvel: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return linear, angular
 
 
+def knees(qpos: np.ndarray) -> np.ndarray:
+    """Return where the knees are in the world, ``(N, 4, 3)``, of MuJoCo configurations ``(N, 23)``."""
+    model = mujoco.MjModel.from_xml_path(str(ASSETS / "go1.xml"))
+    data = mujoco.MjData(model)
+    calves = [model.body(f"{leg}_calf").id for leg in LEGS]
+    places = np.empty((len(qpos), len(LEGS), 3))
+    for k, data.qpos in enumerate(qpos):
+        mujoco.mj_kinematics(model, data)
+        places[k] = data.xpos[calves]
+    return places
+
+
 def convex_bodies(terrain: "Terrain") -> list[list[int]]:
     """Return the indices of the regions that make one convex body each, so that it has no seams.
 

@@ -11,16 +11,24 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from wfbook.go1 import nominal
+from wfbook.go1 import knees, nominal
 
 if TYPE_CHECKING:
     from wfbook.planner.plan import Plan
+    from wfbook.terrain import Terrain
+
+CALF_HALF_THICKNESS = 0.012
+"""Of the box around the calf that collides, across its diagonal."""
 
 _HIPS = nominal()["hip_offsets"][:, :2] - nominal()["hip_offsets"][:, :2].mean(axis=0)
 _SPLINE = (
     np.array([[1.0, 4.0, 1.0, 0.0], [-3.0, 0.0, 3.0, 0.0], [3.0, -6.0, 3.0, 0.0], [-1.0, 3.0, -3.0, 1.0]]) / 6
 )
 """Row i holds the factors of s^i for the four control values of a uniform cubic B-spline."""
+
+
+BY = ("hips", "contacts", "nothing")
+"""By what the trunk leans: the ground's height under the hips, the plane through the contacts, or not."""
 
 
 class Lean:
@@ -31,12 +39,18 @@ class Lean:
 
     Args:
         plan: whose footholds are followed.
+        by: one of :data:`BY`; the other two are for a lesson.
+
+    Raises:
+        ValueError: ``by`` is none of them.
     """
 
-    def __init__(self, plan: "Plan") -> None:
+    def __init__(self, plan: "Plan", by: str = "hips") -> None:
+        if by not in BY:
+            raise ValueError(f"leans: {by!r} is none of {', '.join(BY)}")
         places = plan.p[:: plan.knots // plan.slots]
-        self._slot = plan.slot_duration
-        self._angles = np.array([_angles(contacts) for contacts in places])
+        self._slot, self._by = plan.slot_duration, by
+        self._angles = np.array([_angles(contacts, by) for contacts in places])
 
     def follow(self, plan: "Plan", slot: int) -> None:
         """Go on with another plan from a slot on.
@@ -48,7 +62,7 @@ class Lean:
             slot: the first in which it differs.
         """
         kept = self._angles[: slot + 2]
-        self._angles = np.vstack([kept, Lean(plan)._angles[len(kept) :]])
+        self._angles = np.vstack([kept, Lean(plan, self._by)._angles[len(kept) :]])
 
     def at(self, t: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the trunk's orientation and angular velocity at a time since the plan's start.
@@ -66,11 +80,26 @@ class Lean:
         return np.array([roll, pitch, 0.0]), omega
 
 
-def _angles(contacts: np.ndarray) -> tuple[float, float]:
+def knee_room(qpos: np.ndarray, terrain: "Terrain") -> np.ndarray:
+    """Return how far each knee is from the ground, less half a calf's thickness, ``(N, 4)``.
+
+    Args:
+        qpos: ``(N, 23)`` MuJoCo configurations.
+        terrain: on which the robot stands.
+    """
+    places = knees(qpos)
+    away = [[min(np.linalg.norm(k - r.nearest(k)) for r in terrain.regions) for k in four] for four in places]
+    return np.array(away) - CALF_HALF_THICKNESS
+
+
+def _angles(contacts: np.ndarray, by: str) -> tuple[float, float]:
     """Return roll and pitch at which the hips' heights above contacts ``(4, 3)`` are most alike.
 
     What counts is where the hips are, not where the contacts: with the legs drawn together at the foot of a
     ramp, the plane through the contacts is steeper than any ground under them.
     """
-    (rise_x, rise_y), *_ = np.linalg.lstsq(_HIPS, contacts[:, 2] - contacts[:, 2].mean())
+    if by == "nothing":
+        return 0.0, 0.0
+    places = _HIPS if by == "hips" else contacts[:, :2] - contacts[:, :2].mean(axis=0)
+    (rise_x, rise_y), *_ = np.linalg.lstsq(places, contacts[:, 2] - contacts[:, 2].mean())
     return np.arcsin(rise_y / np.sqrt(1.0 + rise_x**2 + rise_y**2)), -np.arctan(rise_x)

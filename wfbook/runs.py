@@ -9,11 +9,11 @@ from scipy.spatial.transform import Rotation
 
 from wfbook import archive
 from wfbook.centroidal import Robot, RollOut, roll_out
+from wfbook.flights import Swing
 from wfbook.go1 import momenta
 from wfbook.go1_dynamics import GRAVITY
 from wfbook.modes import END_EFFECTORS, LEGS
 from wfbook.terrain import Terrain
-from wfbook.tracking import Swing
 
 if TYPE_CHECKING:
     from wfbook.planner.plan import Plan

@@ -19,7 +19,7 @@ from wfbook.modes import END_EFFECTORS, LEGS
 from wfbook.reference import TICK, Gains, Ground, Reference
 from wfbook.runs import Run, metrics_of
 from wfbook.sensors import SensorNoise, Sensors
-from wfbook.tracking import Tracker
+from wfbook.tracking import Habits, Tracker
 from wfbook.wbc import WholeBodyController, contact_basis, weight_share
 
 if TYPE_CHECKING:
@@ -49,6 +49,7 @@ def run(
     joint_friction: float = 0.0,
     trunk_mass_scale: float = 1.0,
     gains: Gains | None = None,
+    habits: Habits | None = None,
     wheel_model: str = "encoder",
     noise: SensorNoise | None = None,
     real_terrain: "Terrain | None" = None,
@@ -70,6 +71,7 @@ def run(
         joint_friction: dry friction in the simulated joints, N m, which the controller does not know.
         trunk_mass_scale: of the simulated trunk, likewise.
         gains: of the controller.
+        habits: of the tracker, if not all of them.
         wheel_model: of the estimator, one of :data:`wfbook.estimator.WHEEL_MODELS`.
         noise: of the simulated sensors, which the estimator does not know: it trusts the usual ones.
         real_terrain: on which the robot walks, if not on the one of the plan, which is all that the
@@ -88,7 +90,7 @@ def run(
     if state == "true":
         estimator = None
     robot = Go1(real_terrain or plan.terrain, joint_friction, trunk_mass_scale)
-    execution = _Execution(plan, delay, robot, Sensors(seed, noise), seed, push, gains, estimator)
+    execution = _Execution(plan, delay, robot, Sensors(seed, noise), seed, push, gains, habits, estimator)
     execution.meta |= {"joint_friction": joint_friction, "trunk_mass_scale": trunk_mass_scale}
     return execution.run(hold, progress, continuation)
 
@@ -105,6 +107,7 @@ class _Execution:
         seed: int,
         push: tuple[np.ndarray, float, float] | None,
         gains: Gains | None,
+        habits: Habits | None,
         estimator: Estimator | None,
     ) -> None:
         self.plan, self.delay, self.push = plan, delay, push
@@ -112,7 +115,7 @@ class _Execution:
         self.dynamics = Go1Dynamics()
         self.truth = self.dynamics if estimator is None else Go1Dynamics()
         self.controller = WholeBodyController(self.dynamics, gains)
-        self.tracker = Tracker(plan, delay)
+        self.tracker = Tracker(plan, delay, habits)
         self.step_time = float(self.robot.model.opt.timestep)
         self.steps_a_tick = round(TICK / self.step_time)
         kinds = np.array([END_EFFECTORS.index(name) for name in plan.meta["start_end_effectors"]])

@@ -4,8 +4,7 @@ A plan is a list of knots 0.1 s apart; a controller runs every 2 ms and its torq
 later. In between stands :class:`Tracker`. It interpolates the plan, swings the legs, and takes from the
 robot's own sensing what a plan can't know: when a leg really touches the ground.
 
-- The centre of mass is interpolated as the plan was integrated, a parabola between knots. (Holding the
-  last knot is seven times worse.)
+- The centre of mass is interpolated as the plan was integrated, a parabola between knots.
 - A leg is commanded to lift, and forces are redistributed, one delay before the plan says so: then it
   happens on time.
 - A swing aims to land after 88 % of its slot, so that it has landed when the plan loads it.
@@ -13,6 +12,8 @@ robot's own sensing what a plan can't know: when a leg really touches the ground
 - A robot on two legs tips across the line between them. The swinging legs land as far aside as it has
   tipped, and hold it.
 - The end effector is switched in the air, past the apex, when the larger wheel has room.
+
+Each of these is a habit that can be left out (:class:`Habits`), to see what it is good for.
 """
 
 from dataclasses import dataclass
@@ -21,6 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from wfbook.drift import Drift
+from wfbook.flights import LANDING_PHASE, Swing, interpolate, swings_of
 from wfbook.footing import Footing
 from wfbook.go1 import FOOT_RADIUS, RADII, calf_pitch, nominal
 from wfbook.go1_dynamics import GRAVITY, Go1Dynamics, rotation
@@ -32,9 +34,6 @@ from wfbook.swing import quintic_basis, swing_position
 if TYPE_CHECKING:
     from wfbook.planner.plan import Plan
     from wfbook.terrain import Region
-
-LANDING_PHASE = 0.88
-"""Fraction of its slot after which a swing lands."""
 
 _SAMPLE = 0.001
 _SEARCH_SPEED = 0.15
@@ -52,62 +51,30 @@ _ONES = np.ones(4)
 
 
 @dataclass(frozen=True)
-class Swing:
-    """One flight of one leg; consecutive swing slots are one flight.
+class Habits:
+    """What a tracker does besides reading its plan aloud; all of it, unless a lesson leaves something out.
 
     Attributes:
-        start, end: times of the plan's slots.
-        target: ``(3,)`` contact point to land on.
-        kind: end effector to land with, 0 foot, 1 wheel.
-        region: to land on.
+        interpolates: between knots the CoM moves as the plan was integrated; else as at the knot before.
+        foresees: legs lift, and accelerations are asked for, one delay ahead.
+        lands_early: swings land after :data:`wfbook.flights.LANDING_PHASE` of their slots; else at their end.
+        feels: legs stand once they touch the ground, and search it when they miss it; else they stand when
+            the plan says so.
+        steps_aside: swinging legs land beside their places to hold a body that tips.
+        leans: by what the trunk leans, one of :data:`wfbook.lean.BY`.
     """
 
-    start: float
-    end: float
-    target: np.ndarray
-    kind: int
-    region: int
+    interpolates: bool = True
+    foresees: bool = True
+    lands_early: bool = True
+    feels: bool = True
+    steps_aside: bool = True
+    leans: str = "hips"
 
     @property
-    def duration(self) -> float:
-        """Time from lift-off to the planned landing, which is before ``end``."""
-        return LANDING_PHASE * (self.end - self.start)
-
-
-def swings_of(plan: "Plan") -> list[list[Swing]]:
-    """Return the flights of each leg, in order."""
-    rho = plan.knots // plan.slots
-    kinds, regions = plan.end_effector, plan.D.sum(axis=3).argmax(axis=2)
-    flights: list[list[Swing]] = []
-    for leg in range(4):
-        padded = np.diff(np.concatenate([[0], plan.S[leg], [0]]))
-        flights.append([])
-        for first, after in zip(np.flatnonzero(padded == 1), np.flatnonzero(padded == -1), strict=True):
-            flights[leg].append(
-                Swing(
-                    float(plan.t[first * rho] - plan.t[0]),
-                    float(plan.t[after * rho] - plan.t[0]),
-                    plan.p[after * rho, leg],
-                    int(kinds[leg, after - 1]),
-                    int(regions[leg, after - 1]),
-                )
-            )
-    return flights
-
-
-def interpolate(plan: "Plan", t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the planned CoM, its velocity and acceleration at a time since the plan's start, each ``(3,)``.
-
-    Before and after the plan, its first and last position at rest.
-    """
-    dt = plan.dt
-    if t < 0.0:
-        return plan.x[0], np.zeros(3), np.zeros(3)
-    k = int(t / dt + 1e-9)
-    if k >= plan.knots:
-        return plan.x[-1], np.zeros(3), np.zeros(3)
-    s = t - k * dt
-    return plan.x[k] + s * plan.v[k] + 0.5 * s * s * plan.a[k], plan.v[k] + s * plan.a[k], plan.a[k]
+    def landing_phase(self) -> float:
+        """Fraction of its slots after which a swing lands."""
+        return LANDING_PHASE if self.lands_early else 1.0
 
 
 class Tracker:
@@ -116,6 +83,7 @@ class Tracker:
     Args:
         plan: to follow. Its time 0 is the tracker's.
         delay: after which torques act.
+        habits: what it does besides; by default everything.
 
     Attributes:
         stance: ``(4,)`` bool, which legs are commanded to carry load now.
@@ -125,9 +93,11 @@ class Tracker:
         drift: how far the plan goes along with a robot that rolls away.
     """
 
-    def __init__(self, plan: "Plan", delay: float) -> None:
-        self.plan, self.delay = plan, delay
-        self.flights, self.lean, self.drift = swings_of(plan), Lean(plan), Drift()
+    def __init__(self, plan: "Plan", delay: float, habits: Habits | None = None) -> None:
+        self.plan, self.delay, self.habits = plan, delay, habits or Habits()
+        self.flights, self.drift = swings_of(plan, self.habits.landing_phase), Drift()
+        self.lean = Lean(plan, self.habits.leans)
+        self._lead = delay if self.habits.foresees else 0.0
         self.stance = np.ones(4, bool)
         self.lifted = np.zeros(4, int)
         self._from = np.zeros((4, 3))
@@ -153,7 +123,7 @@ class Tracker:
             plan: up to the slot as the present one; no leg swings on both sides of the slot's begin.
             slot: the first in which it differs.
         """
-        self.plan, self.flights = plan, swings_of(plan)
+        self.plan, self.flights = plan, swings_of(plan, self.habits.landing_phase)
         self.lean.follow(plan, slot)
         self.drift.end_at(slot * plan.slot_duration)
 
@@ -173,8 +143,8 @@ class Tracker:
         """
         ends = robot.centres
         self._last_touch[touching | (forces[:, 2] < _LOADED)] = t  # who presses on nothing feels nothing
-        com, velocity, _ = interpolate(self.plan, t)
-        ahead = interpolate(self.plan, t + self.delay)[2]
+        com, velocity, _ = self._planned(t)
+        ahead = self._planned(t + self._lead)[2]
         for leg in range(4):
             self._advance(leg, t, bool(touching[leg]), ends[leg], robot.centre_velocity[leg])
         rolling, normal = bool((self._kinds | ~self.stance).all()), 0.25 * (_ONES @ self.footing.normals)
@@ -190,7 +160,8 @@ class Tracker:
         ground = self.footing.ground()
         v, a = self._kinds[:, None] * velocity, np.zeros((4, 3))
         if not self.stance.all():
-            self._step_aside(t, robot, com, velocity)
+            if self.habits.steps_aside:
+                self._step_aside(t, robot, com, velocity)
             for leg in np.flatnonzero(~self.stance):
                 p[leg], v[leg], a[leg] = self._in_the_air(leg, t, ground.normals[leg])
         wheels = self._kinds.astype(bool)
@@ -215,10 +186,16 @@ class Tracker:
                 wanted.append((LEGS[leg], END_EFFECTORS[self._kinds[leg]]))
         return wanted
 
+    def _planned(self, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the planned CoM, its velocity and acceleration, ``(3,)`` each."""
+        if not self.habits.interpolates:
+            t = self.plan.dt * np.floor(t / self.plan.dt + 1e-9)
+        return interpolate(self.plan, t)
+
     def _advance(self, leg: int, t: float, touching: bool, end: np.ndarray, velocity: np.ndarray) -> None:
         """Move one leg's state on: lift-off, touch-down, loss of contact."""
         flights, count = self.flights[leg], self.lifted[leg]
-        if count < len(flights) and t + self.delay >= flights[count].start - 1e-9 and self._may_lift(leg, t):
+        if count < len(flights) and t + self._lead >= flights[count].start - 1e-9 and self._may_lift(leg, t):
             flight = flights[count]
             self.lifted[leg] += 1
             self.stance[leg] = False
@@ -230,7 +207,7 @@ class Tracker:
             self._shift[leg] = 0.0
             return
         if self.stance[leg]:
-            if t > 0 and t - self._last_touch[leg] > self.delay + _LOST_AFTER:
+            if self.habits.feels and t > 0 and t - self._last_touch[leg] > self.delay + _LOST_AFTER:
                 self.stance[leg] = False
                 self._from[leg] = end
                 self._searching_since[leg] = t
@@ -238,7 +215,7 @@ class Tracker:
         searching = np.isfinite(self._searching_since[leg])
         flight = flights[count - 1] if count else None
         falling = searching or t >= flight.start + 0.5 * flight.duration
-        if falling and touching:
+        if (falling and touching) if self.habits.feels else (t + self._lead >= flight.end):
             self.stance[leg] = True
             self._searching_since[leg] = np.nan
 
@@ -350,7 +327,7 @@ class Tracker:
             position = path[0, -1, :3] + shift + late * landing - depth * normal
             return position, landing - _SEARCH_SPEED * normal, np.zeros(3)
         elapsed = t - self._start[leg]
-        now = np.vstack([_sampled(path[:2], elapsed), _sampled(path[2:], elapsed + self.delay)])
+        now = np.vstack([_sampled(path[:2], elapsed), _sampled(path[2:], elapsed + self._lead)])
         return tuple(now[:, :3] + now[:, 3:] * shift)
 
     def _step_aside(self, t: float, robot: Go1Dynamics, com: np.ndarray, velocity: np.ndarray) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 
 from wfbook.centroidal import GRAVITY
 from wfbook.modes import END_EFFECTORS
-from wfbook.planner.extract import problem_of
+from wfbook.planner.extract import gait_of, problem_of
 from wfbook.planner.plan import Plan
 from wfbook.planner.program import Grid, Program, cost_terms
 
@@ -33,6 +33,58 @@ def friction_needed(plan: Plan, end_effector: str = "foot") -> float:
         loaded = normal > _LOADED * weight
         worst = max(worst, float((sideways[loaded] / normal[loaded]).max(initial=0.0)))
     return worst
+
+
+def load_carried(plan: Plan) -> np.ndarray:
+    """Return the share of the weight with which each leg presses on the ground, ``(K, L)``.
+
+    Args:
+        plan: its forces count along the normal of the region in which each leg ends its slot.
+
+    Returns:
+        Nothing (NaN) for a leg in the air.
+    """
+    weight, (_, _, normal) = float(plan.meta["mass"]) * GRAVITY, _bases(plan)
+    return np.where(_stands(plan), np.sum(plan.lam * normal, axis=-1) / weight, np.nan)
+
+
+def grip_used(plan: Plan) -> np.ndarray:
+    """Return the share of its friction pyramid that each leg's force uses, ``(K, L)`` (Paper A, eq. 26).
+
+    Args:
+        plan: its forces are seen in the basis of the region in which each leg ends its slot.
+
+    Returns:
+        Of a foot the larger of the two directions', of a wheel that along its axle; nothing (NaN) for a leg
+        in the air or hardly loaded.
+    """
+    regions, (tangent, binormal, _) = plan.terrain.regions, _bases(plan)
+    share = load_carried(plan)
+    ends = np.repeat(plan.end_effector, plan.knots // plan.slots, axis=1).T
+    wheel = ends == END_EFFECTORS.index("wheel")
+    along, across = (np.abs(np.sum(plan.lam * d, axis=-1)) for d in (tangent, binormal))
+    where = np.repeat(gait_of(plan).region, plan.knots // plan.slots, axis=1).T
+    mu_foot, mu_wheel = (
+        np.array([getattr(region, name) for region in regions])[where]
+        for name in ("mu_foot", "mu_wheel_lateral")
+    )
+    sideways = np.where(wheel, across / mu_wheel, np.maximum(along, across) / mu_foot)
+    normal = np.where(share > _LOADED, share, np.nan) * float(plan.meta["mass"]) * GRAVITY
+    return sideways / normal
+
+
+def _stands(plan: Plan) -> np.ndarray:
+    """``(K, L)`` bool, which legs stand."""
+    return np.repeat(plan.S == 0, plan.knots // plan.slots, axis=1).T
+
+
+def _bases(plan: Plan) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return t, b and n of the region under each leg, ``(K, L, 3)`` each."""
+    where = np.repeat(gait_of(plan).region, plan.knots // plan.slots, axis=1).T
+    directions = (
+        [getattr(r, name) for r in plan.terrain.regions] for name in ("tangent", "binormal", "normal")
+    )
+    return tuple(np.array(group)[where] for group in directions)
 
 
 def reach_needed(plan: Plan) -> np.ndarray:

@@ -26,6 +26,9 @@ import numpy as np
 from wfbook.planner.gait import Gait
 from wfbook.planner.problem import Problem
 
+MARGINS = ("edges", "grip", "load", "knees")
+"""What a plan keeps in hand; a lesson may leave some out."""
+
 MARGIN = 0.015
 """How far inside, where there is room."""
 
@@ -82,20 +85,28 @@ def kept_off(problem: Problem, gait: Gait) -> Iterator[Edge]:
                 yield Edge(int(leg), int(slot), a, float(b) - _margin(problem, region, i, a))
 
 
-def kept_in_grip(problem: Problem, gait: Gait) -> Iterator[tuple[int, int, np.ndarray, float]]:
+def kept_in_grip(
+    problem: Problem, gait: Gait, grip: bool = True, load: bool = True
+) -> Iterator[tuple[int, int, np.ndarray, float]]:
     """Yield smaller friction pyramids, cut off below: an interval, leg, and ``c · λ ≤ most`` in body weights.
 
     Interval K is the rest after the plan, where that ends at rest.
 
     A wheel that rolls over an edge within a slot is taken to be on the region on which it ends.
+
+    Args:
+        problem: whose terrain it is.
+        gait: contacts.
+        grip: whether pyramids are smaller.
+        load: whether they are cut off below.
     """
     many = (gait.S == 0).sum(axis=0) >= 3
     for leg, slot in np.argwhere(gait.S == 0):
         intervals = list(range(problem.knots_per_slot * slot, problem.knots_per_slot * (slot + 1)))
         if slot == problem.slots - 1 and problem.final_stance:
             intervals.append(problem.knots)
-        sides = [(side, 0.0) for side in _sides(problem, gait, leg, slot, GRIP)]
-        if many[slot]:
+        sides = [(side, 0.0) for side in _sides(problem, gait, leg, slot, GRIP)] if grip else []
+        if load and many[slot]:
             sides.append((-problem.terrain.regions[int(gait.region[leg, slot])].normal, -LOAD))
         for side, most in sides:
             for k in intervals:

@@ -11,6 +11,7 @@ interval brakes, uphill with less traction than holding takes. So the polish has
 forces, those at rest: they carry the weight, turn nothing and keep to friction.
 """
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import cvxpy as cp
@@ -24,7 +25,7 @@ from wfbook.planner.contacts import assignment
 from wfbook.planner.crossings import Crossings, settle
 from wfbook.planner.extract import fill, gait_of, plan_of, problem_of, read
 from wfbook.planner.gait import Gait
-from wfbook.planner.margins import held_at_rest, kept_in_grip, kept_off, kept_off_knees
+from wfbook.planner.margins import MARGINS, held_at_rest, kept_in_grip, kept_off, kept_off_knees
 from wfbook.planner.plan import Plan
 from wfbook.planner.presolve import solve_fixed
 from wfbook.planner.problem import Problem
@@ -87,22 +88,28 @@ class Polisher:
         self._conic = Conic.compile(cost, program.rows(without=("torque", "torque bounds")) + ties)
         self._program_columns = {key: self._conic.columns(v) for key, v in program.discrete.items()}
 
-    def polish(self, plan: Plan) -> Plan:
+    def polish(self, plan: Plan, without: Collection[str] = ()) -> Plan:
         """Return the plan with the same binaries and true torque.
 
         Args:
             plan: a relaxed plan of this problem.
+            without: margins to leave out, of :data:`wfbook.planner.margins.MARGINS`.
 
         Returns:
             The polished plan. ``meta["torque_mismatch_nm"]`` holds the rms per axis of what is left,
             ``meta["relaxed_torque_mismatch_nm"]`` that of the relaxed plan, and
             ``meta["rest_mismatch_nm"]``, where the plan ends at rest, the torque that it lacks to stay there;
             :func:`repaired` judges.
+
+        Raises:
+            ValueError: ``without`` names no margin.
         """
+        if unknown := sorted(set(without) - set(MARGINS)):
+            raise ValueError(f"without: {unknown[0]!r} is none of {', '.join(MARGINS)}")
         weight, conic = self.problem.robot.weight, self._conic
         gait = gait_of(plan)
         columns, fixed = self._binaries(gait, plan.p)
-        margins = self._margins(gait)
+        margins = self._margins(gait, without)
         lever = list(np.moveaxis(plan.middle_lever, -1, 0))
         force = [plan.lam[..., i] / weight for i in range(3)]
         if self.problem.final_stance:
@@ -166,7 +173,7 @@ class Polisher:
                 settled = np.rint(found.y[columns])
         return columns, settled
 
-    def _margins(self, gait: Gait) -> tuple[sparse.csc_matrix, np.ndarray]:
+    def _margins(self, gait: Gait, without: Collection[str]) -> tuple[sparse.csc_matrix, np.ndarray]:
         """Return rows and right-hand sides of the margins, softened by ``_short``, ``_slip`` and ``_low``."""
         problem, conic = self.problem, self._conic
         p = np.stack([conic.columns(c) for c in self.program.p[:2]])
@@ -174,16 +181,16 @@ class Polisher:
         lever = np.stack([conic.columns(v) for v in self._lever])
         short, slip, low = (conic.columns(v) for v in (self._short, self._slip, self._low))
         columns, entries, right = [], [], []
-        for leg, slot, a, b in kept_off(problem, gait):
+        for leg, slot, a, b in () if "edges" in without else kept_off(problem, gait):
             knot = problem.knots_per_slot * (slot + 1)
             columns.append([*p[:, knot, leg], short[leg, slot]])
             entries.append([*a, -1.0])
             right.append(b)
-        for k, leg, c, most in kept_in_grip(problem, gait):
+        for k, leg, c, most in kept_in_grip(problem, gait, "grip" not in without, "load" not in without):
             columns.append([*force[:, k, leg], slip[k, leg]])
             entries.append([*c, -1.0])
             right.append(most)
-        for k, leg, c, most in kept_off_knees(problem, gait):
+        for k, leg, c, most in () if "knees" in without else kept_off_knees(problem, gait):
             columns.append([*lever[:, k, leg], low[k, leg]])
             entries.append([*c, -1.0])
             right.append(most)
@@ -271,19 +278,20 @@ class Polisher:
         )
 
 
-def polish(plan: Plan) -> Plan:
+def polish(plan: Plan, without: Collection[str] = ()) -> Plan:
     """Make a relaxed plan executable: binaries fixed, true torque (see :class:`Polisher`).
 
     Args:
         plan: what :func:`wfbook.planner.solve` returned.
+        without: margins to leave out, to see what they are good for (:data:`wfbook.planner.margins.MARGINS`).
 
     Returns:
         The polished plan; objective, bound and gap are those of the relaxed one.
 
     Raises:
-        ValueError: the plan's ``meta`` does not describe its problem.
+        ValueError: the plan's ``meta`` does not describe its problem, or ``without`` names no margin.
     """
-    return Polisher(problem_of(plan)).polish(plan)
+    return Polisher(problem_of(plan)).polish(plan, without)
 
 
 def torque_mismatch(plan: Plan) -> np.ndarray:

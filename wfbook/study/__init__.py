@@ -9,5 +9,5 @@ In reading order: :mod:`.axes` says what can be disturbed, :mod:`.ground` builds
 plan thinks, :mod:`.case` runs one case, :mod:`.design` says which cases a study has, :mod:`.store` keeps
 what is finished, :mod:`.cluster` runs cases through Dask, :mod:`.tables` makes the Parquet file and the
 summary, :mod:`.text` prints that, :mod:`.plans` brings the plans, :mod:`.command` is
-``python -m wfbook study``.
+``python -m wfbook study``; :mod:`.here` runs a handful of cases without any of that.
 """

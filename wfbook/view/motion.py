@@ -148,11 +148,15 @@ def motion_of_tipping(tipping: Tipping) -> Motion:
     )
 
 
-def motion_of_plan(plan: "Plan") -> Motion:
+def motion_of_plan(plan: "Plan", leans: str = "hips") -> Motion:
     """Pose the robot as a plan wants it, whether or not any controller could do it.
 
     Between knots the motion is interpolated so that a foot which stands stays where it is. The trunk leans
     with the ground as the controller lets it.
+
+    Args:
+        plan: what is wanted.
+        leans: by what the trunk leans, one of :data:`wfbook.lean.BY`.
 
     Raises:
         ValueError: the plan puts a leg where the Go1's can't reach.
@@ -169,7 +173,7 @@ def motion_of_plan(plan: "Plan") -> Motion:
     wheel = plan.end_effector.T[slot]
     phase = (times - plan.t[0]) / plan.slot_duration - slot
     centres = contact + RADII[wheel][..., None] * _normals(plan, slot, phase)
-    robot, lean = Go1Dynamics(), Lean(plan)
+    robot, lean = Go1Dynamics(), Lean(plan, leans)
     qpos = []
     for frame, time in enumerate(times - plan.t[0]):
         qpos.append(robot.posture(com[frame], theta[frame] + lean.at(time)[0], centres[frame]))

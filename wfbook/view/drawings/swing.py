@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.lines import Line2D
 
+from wfbook.flights import swings_of
 from wfbook.go1_dynamics import leg_motion
 from wfbook.modes import LEGS
 from wfbook.swing import quintic_basis, septic_basis, swing_position
-from wfbook.tracking import swings_of
 from wfbook.view.style import FOOT, INK, MEASURED, MODE_COLOURS, PLANNED, SWING, WHEEL, Picture, tidy
 
 if TYPE_CHECKING:
