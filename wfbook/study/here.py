@@ -1,11 +1,24 @@
 """A study of a handful of runs, one after the other in this process: for a chapter, without a cluster."""
 
+import tempfile
 from collections.abc import Callable
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from wfbook.study.case import execute
 from wfbook.study.design import Study
 from wfbook.study.tables import summary
+
+if TYPE_CHECKING:
+    from wfbook.planner.plan import Plan
+
+
+def plan_file(plan: "Plan") -> bytes:
+    """Return the content of a plan's file, which is what a study is about."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "plan.npz"
+        plan.save(path)
+        return path.read_bytes()
 
 
 def run(

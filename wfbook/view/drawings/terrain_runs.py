@@ -187,7 +187,7 @@ def in_hand(plans: "Mapping[str, Plan]") -> Picture:
         rows[2].plot(t, 1e3 * room, **look)
     for axes, level in zip(rows, (1.0, 0.0, 0.0), strict=True):
         tidy(axes)
-        axes.axhline(level, color=LIMIT, linewidth=1.6, gid="limit")
+        axes.axhline(level, color=LIMIT, linewidth=3.0, zorder=1, gid="limit")
     for axes, level in ((rows[0], GRIP), (rows[1], LOAD)):
         axes.axhline(level, color=BODY, linewidth=1.0, linestyle=":", gid="margin")
     rows[0].set_ylabel("grip used,\nthe worst foot")
