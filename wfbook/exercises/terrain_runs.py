@@ -173,7 +173,7 @@ def _guess(plan: Any, t: float, name: str) -> str:
 
 
 def own_ground(data: Any) -> str:
-    """Check a terrain of one's own: rough, and crossed by the robot.
+    """Check a terrain of one's own: rough, and crossed by the robot on its feet.
 
     Args:
         data: as in a terrain file.
@@ -187,8 +187,8 @@ def own_ground(data: Any) -> str:
         raise WrongAnswer(str(error)) from None
     _demand_roughness(terrain)
     try:
-        problem = planner.Problem(terrain, goal=(_GOAL, 0.0), slots=_SLOTS)
-        plan = planner.solve_executable(problem, gap=0.02, time_limit=_PATIENCE)[1]
+        problem = planner.Problem(terrain, goal=(_GOAL, 0.0), slots=_SLOTS, end_effectors=("foot",))
+        plan = planner.solve_executable(problem, gap=0.05, time_limit=_PATIENCE)[1]
     except (ValueError, planner.InfeasibleError, planner.NoPlanError) as error:
         raise WrongAnswer(f"there is no plan: {' '.join(str(error).split())}") from None
     used = np.unique(plan.meta["regions"])
