@@ -129,10 +129,10 @@ def pushes(survives: Any, plan_file: bytes, finished: dict[str, dict[str, Any]])
         if bool(said) != upright[float(key)]:
             what = "stays upright" if upright[float(key)] else "falls"
             raise WrongAnswer(
-                f"pushed {_ANGLES[float(key)]} the robot {what}. It walks ahead: where do the legs in the "
-                "air come down, and on which side of them is it pushed?"
+                f"pushed {_ANGLES[float(key)]} the robot {what}. A robot can tip, and it can sit down: which "
+                "way do its knees point?"
             )
-    return "Right, all three. Its feet come down ahead of it, and that is where they can catch it."
+    return "Right, all three. Backwards it does not tip: its knees point back, and it sits down on a calf."
 
 
 def between_knots(function: Callable[..., Any]) -> str:

@@ -50,12 +50,12 @@ def gait(plan: "Plan", run: "Execution", title: str) -> Picture:
 
 
 def way(
-    cases: "Mapping[str, tuple[str, Plan, Execution | None]]", ends: Mapping[str, tuple[float, float]]
+    cases: "Mapping[str, tuple[str, Plan, Execution]]", ends: Mapping[str, tuple[float, float]]
 ) -> Picture:
     """Draw how far the robot is over time, planned and simulated, as the paper's fig. 13.
 
     Args:
-        cases: by key, a name, the plan that was executed and a run of it, or None.
+        cases: by key, a name, the plan that was executed and a run of it.
         ends: by key, time and distance that the paper reports.
 
     Returns:
@@ -71,10 +71,9 @@ def way(
             plan.t, plan.x[:, 0] - plan.x[0, 0], color=colour, linestyle=stroke, linewidth=3, label=name
         )
         handles[-1].set_gid(f"{key} planned")
-        if run is not None:
-            going = run.t >= 0.0
-            moved = run.com[going, 0] - run.com[going][0, 0]
-            axes.plot(run.t[going], moved, color=MEASURED, linewidth=1.0, gid=f"{key} simulated")
+        going = run.t >= 0.0
+        moved = run.com[going, 0] - run.com[going][0, 0]
+        axes.plot(run.t[going], moved, color=MEASURED, linewidth=1.0, gid=f"{key} simulated")
         style = {"color": colour, "markeredgecolor": INK, "clip_on": False, "zorder": 3}
         axes.plot(*ends[key], "D", **style, gid=f"{key} paper")
     handles.append(Line2D([], [], color=MEASURED, linewidth=1.0, label="simulated"))

@@ -64,7 +64,7 @@ class Margins(Simulating):
         known: "dict[Polished, Run] | None" = None,
         simulator: "Callable[[Plan, Told], Run] | None" = None,
     ) -> None:
-        self._simulator = simulator or (lambda plan, told: simulate.run(plan, hold=0.5, progress=told))
+        self._simulator = simulator or (lambda plan, told: simulate.run(plan, progress=told))
         self._plans: dict[Polished, Plan] = {}
         names = ("ramp-down", "ramp-up", "stepping-stones", "flat", "flat-feet")
         self.plan = choice(names, "ramp-down", "gait")
