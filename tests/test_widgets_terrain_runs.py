@@ -223,6 +223,8 @@ def test_windows_cover_the_way_once(run):
         ends = np.cumsum([width for _, width in executed])
         assert [x for x, _ in executed] == pytest.approx([0.0, *ends[:-1]])
         assert ends[-1] == pytest.approx(11 * 0.3)
+        assert np.diff([x for x, _ in executed]) == pytest.approx([commit * 0.3] * (len(executed) - 1))
+        assert 11 - (len(executed) * commit) < 2  # not enough left for another window
     panel.window.value = 4
     assert panel.asked is None and "longer than" in panel.status.value
     panel.button.click()

@@ -259,7 +259,7 @@ def windows(
 def _begins(slots: int, window: int, commit: int) -> list[tuple[int, int]]:
     """Return first slot and end of each window, if each is there in time."""
     found = [(0, min(window, slots))]
-    while found[-1][1] < slots and slots - (found[-1][0] + commit) >= 2:
+    while slots - (found[-1][0] + commit) >= 2:  # what is left is enough for a swing and a stance
         begin = found[-1][0] + commit
         found.append((begin, min(begin + window, slots)))
     return found

@@ -174,7 +174,7 @@ class SmallStudy(Panel):
             if missing
             else "All runs are done."
         )
-        self.say(f"{left} Otherwise {_base_text(self.down.value, self.across.value)}.")
+        self.say(f"{left} Besides: {_base_text(self.down.value, self.across.value)}.")
 
     def simulate(self, _button: object = None) -> None:
         """Run what is missing, and draw it as it comes."""
@@ -217,16 +217,9 @@ def small_study(
 
 
 def _base_text(*chosen: str) -> str:
-    kept = {name: value for name, value in BASE.items() if name not in chosen}
-    return (
-        "a "
-        + ", ".join(
-            f"{AXES[name].label.split(' (')[0]} of {value:g} {AXES[name].unit}"
-            for name, value in kept.items()
-        )
-        if kept
-        else "nothing is done to it"
-    )
+    """Return what is done to the robot besides two axes."""
+    kept = {AXES[name]: level for name, level in BASE.items() if name not in chosen}
+    return ", ".join(f"{axis.name.replace('_', ' ')} {level:g} {axis.unit}" for axis, level in kept.items())
 
 
 @dataclass(frozen=True)
@@ -278,7 +271,7 @@ class Windows(Simulating):
     def __init__(self, simulator: "Callable[[Ahead, Told], Run]" = walked) -> None:
         self._simulator = simulator
         self.window = _whole(6, 3, 8, "slots planned at once")
-        self.commit = _whole(3, 1, 6, "executed before the next")
+        self.commit = _whole(3, 1, 6, "executed of them")
         self.budget = _whole(12, 4, 40, "programs for a window")
         self.windows = ipywidgets.HTML()
         super().__init__([self.window, self.commit, self.budget], ["windows"], self.COLUMNS)
