@@ -249,7 +249,7 @@ def test_feedback_is_how_the_torque_changes_with_the_state():
     step[[3, 6, 15, 25]] = 1e-5
     xs, us = list(ocp.xs), list(ocp.us)
     near = ocp.state.integrate(x, step)
-    predicted = ocp.torque(0, near) - torque
+    predicted = ocp.follow(0.0, near)[1] - torque
     np.testing.assert_allclose(predicted, K @ step, atol=1e-6)
     ocp.xs, ocp.us = xs, us
     ocp.solve(near)

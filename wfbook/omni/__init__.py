@@ -6,5 +6,7 @@ that does it. Chapter 10: :mod:`.wrench` is what one contact can do, :mod:`.supp
 :mod:`.dynamics` how the robot accelerates on them, and :mod:`.tipping` the robot pushed over. Chapter 11:
 :mod:`.ddp` is the method in plain NumPy, for the :mod:`.systems` that it is shown on; for the robot itself
 :mod:`.locked` has its 41 states, :mod:`.costs` the terms of the cost, and :mod:`.problem` the optimal
-control problem in Crocoddyl.
+control problem in Crocoddyl. Chapter 12: :mod:`.waves` is the terrain, :mod:`.rolling` keeps the wheels to a
+commanded base, :mod:`.controller` is whole-body control and what paper B compares itself with, and
+:mod:`.simulate` the runs.
 """

@@ -42,13 +42,13 @@ class Weights:
     """
 
     leg: float = 1e4
-    com: tuple[float, float, float] = (100.0, 100.0, 30.0)
+    com: tuple[float, float, float] = (300.0, 300.0, 1000.0)
     contact: float = 1e-2
     effort: float = 1e-4
     trunk: tuple[float, float, float] = (60.0, 60.0, 200.0)
     posture: float = 1.0
     arm_posture: float = 0.3
-    velocity: float = 0.3
+    velocity: float = 0.5
     hand: tuple[float, float, float] = (1000.0, 1000.0, 20000.0)
     hand_rotation: float = 1000.0
     limits: float = 1e3

@@ -92,6 +92,7 @@ class Target:
         posture: ``(14,)`` angles of legs and arm.
         effort: ``(14,)`` torques that hold the robot.
         feet: ``(4, 3)`` where wheels that swing should be; unused for others.
+        height: of the trunk above the ground in this posture.
     """
 
     hand: np.ndarray
@@ -101,6 +102,7 @@ class Target:
     posture: np.ndarray
     effort: np.ndarray
     feet: np.ndarray
+    height: float
 
 
 def holding_effort(model: pin.Model, x: np.ndarray) -> np.ndarray:
@@ -128,15 +130,18 @@ def nominal_state(height: float = NOMINAL_HEIGHT) -> np.ndarray:
     return locked_state(robot_posture(height=height), np.zeros(NV))
 
 
-def nominal_target(height: float = NOMINAL_HEIGHT, hand_height: float = HAND_HEIGHT) -> Target:
+def nominal_target(
+    height: float = NOMINAL_HEIGHT, hand_height: float = HAND_HEIGHT, hand_reach: float = HAND_REACH
+) -> Target:
     """Return what holds the hand where Paper B holds it, over a robot at the origin.
 
     Args:
         height: of the trunk above the ground.
         hand_height: likewise.
+        hand_reach: of the hand ahead of the shoulder.
     """
     model = locked_model()
-    data, x = model.createData(), locked_state(robot_posture(height, hand_height, HAND_REACH), np.zeros(NV))
+    data, x = model.createData(), locked_state(robot_posture(height, hand_height, hand_reach), np.zeros(NV))
     pin.framesForwardKinematics(model, data, x[:NQ_LOCKED])
     hand = data.oMf[model.getFrameId("hand")]
     feet = [data.oMf[model.getFrameId(f"{leg}_axle")].translation for leg in LEGS]
@@ -148,4 +153,5 @@ def nominal_target(height: float = NOMINAL_HEIGHT, hand_height: float = HAND_HEI
         posture=x[7:NQ_LOCKED],
         effort=np.zeros(NU_LOCKED),
         feet=np.array(feet),
+        height=height,
     )

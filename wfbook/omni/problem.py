@@ -63,6 +63,7 @@ class OptimalControl:
         problem, solver: Crocoddyl's.
         xs: ``(N+1)`` states ``(41,)`` of the last solution.
         us: ``(N)`` torques ``(14,)``.
+        payload: mass in the hand that it reckons with.
 
     Raises:
         ValueError: an unknown mode, term or solver.
@@ -89,6 +90,9 @@ class OptimalControl:
         self.nodes, self.dt, self.mode, self.mu = nodes, dt, mode, mu
         self.weights = Weights() if weights is None else weights
         self.model = contact_model()
+        wrist = self.model.frames[self.model.getFrameId("hand")].parentJoint
+        self._unloaded = self.model.inertias[wrist].copy()
+        self.payload = 0.0
         self.state = crocoddyl.StateMultibody(self.model)
         self.actuation = crocoddyl.ActuationModelFloatingBase(self.state)
         self._data = self.model.createData()
@@ -270,18 +274,37 @@ class OptimalControl:
         """
         return -np.array(self.solver.K[node])
 
-    def torque(self, node: int, x: np.ndarray, share: float = 0.0) -> np.ndarray:
-        """Return the torques ``(14,)`` of eq. 21 in a state near the planned one.
+    def follow(self, share: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return what is planned within the first time step, and the torques of eq. 21 near it.
 
         Args:
-            node: of the horizon.
+            share: of the step that has passed, 0 to 1.
             x: ``(41,)`` measured.
-            share: how far the time has gone on from this node to the next, 0 to 1.
+
+        Returns:
+            The planned state ``(41,)`` and torques ``(14,)``.
         """
-        planned = self.state.integrate(
-            self.xs[node], share * self.state.diff(self.xs[node], self.xs[node + 1])
-        )
-        return self.us[node] + self.feedback(node) @ self.state.diff(planned, x)
+        way = self.state.diff(self.xs[0], self.xs[1])
+        planned = self.state.integrate(self.xs[0], share * way)
+        return planned, self.us[0] + self.feedback(0) @ self.state.diff(planned, x)
+
+    def load(self, mass: float) -> None:
+        """Put a point mass into the hand, in place of what was there; every node has it from now on."""
+        hand = self.model.frames[self.model.getFrameId("hand")]
+        point = pin.Inertia(mass, hand.placement.translation, np.zeros((3, 3)))
+        self.model.inertias[hand.parentJoint] = self._unloaded + point
+        self.payload = mass
+
+    def acceleration(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return the acceleration ``(20,)`` of eq. 4."""
+        dynamics, data = self.actions[0].differential, self.problem.runningDatas[0].differential
+        dynamics.calc(data, x, u)
+        return np.array(data.xout)
+
+    def predict(self, x: np.ndarray, u: np.ndarray, duration: float) -> np.ndarray:
+        """Return the state ``(41,)`` that torques ``(14,)`` lead to in a short while: one step of eq. 4."""
+        gained = duration * self.acceleration(x, u)
+        return self.state.integrate(x, np.concatenate([duration * (x[NQ_LOCKED:] + gained), gained]))
 
     def forces(self, node: int) -> np.ndarray:
         """Return the forces ``(4, 3)`` that the last solution expects at a node, in the contacts' axes.
