@@ -4,7 +4,6 @@ Both end effectors sit on the calf's end, concentric. Only one of them collides 
 mechanism switches "nearly instantly during the swing phase", and so does :meth:`Go1.set_end_effector`.
 """
 
-import itertools
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -285,15 +284,23 @@ def convex_bodies(terrain: "Terrain") -> list[list[int]]:
     In a hollow they can't be, and need not: there a wheel leaves the one as it touches the other.
     """
     bodies = [[i] for i in range(len(terrain.regions))]
+    boxes = [(r.vertices[:, :2].min(axis=0), r.vertices[:, :2].max(axis=0)) for r in terrain.regions]
     joined = True
     while joined:
         joined = False
-        for a, b in itertools.combinations(bodies, 2):
-            if _convex(terrain, a, b):
-                a += b
-                bodies.remove(b)
-                joined = True
-                break
+        first = 0
+        while first < len(bodies):
+            for other in range(first + 1, len(bodies)):
+                (low, high), (low_other, high_other) = boxes[first], boxes[other]
+                apart = (low > high_other + _SEAM).any() or (low_other > high + _SEAM).any()
+                if not apart and _convex(terrain, bodies[first], bodies[other]):
+                    bodies[first] += bodies.pop(other)
+                    boxes[first] = np.minimum(low, low_other), np.maximum(high, high_other)
+                    boxes.pop(other)
+                    joined = True
+                    break
+            else:
+                first += 1
     return bodies
 
 

@@ -4,5 +4,9 @@ In reading order: :mod:`.robot` is the robot in MuJoCo and in Pinocchio. Chapter
 four steered wheels move a body, :mod:`.base` what their motors let it do, and :mod:`.driving` the robot
 that does it. Chapter 10: :mod:`.wrench` is what one contact can do, :mod:`.support` what all of them can,
 :mod:`.dynamics` how the robot accelerates on them, and :mod:`.tipping` the robot pushed over. Chapter 11:
-:mod:`.ddp` is the method in plain NumPy, for the :mod:`.systems` that it is shown on.
+:mod:`.ddp` is the method in plain NumPy, for the :mod:`.systems` that it is shown on; for the robot itself
+:mod:`.locked` has its 41 states, :mod:`.costs` the terms of the cost, and :mod:`.problem` the optimal
+control problem in Crocoddyl. Chapter 12: :mod:`.waves` is the terrain, :mod:`.rolling` keeps the wheels to a
+commanded base, :mod:`.controller` is whole-body control and what paper B compares itself with, and
+:mod:`.simulate` the runs.
 """

@@ -169,8 +169,14 @@ class Omni:
         add_ground(spec, terrain, WHEEL_RADIUS)
         if payload > 0.0:
             place, inertia = spec.site("hand").pos, [1e-6, 1e-6, 1e-6]
+            # Without an ipos of its own the mass would hang twice as far out.
             spec.body("link06").add_body(
-                name="payload", pos=place, mass=payload, inertia=inertia, explicitinertial=True
+                name="payload",
+                pos=place,
+                ipos=[0.0] * 3,
+                mass=payload,
+                inertia=inertia,
+                explicitinertial=True,
             )
         self.terrain = terrain
         self.model = model = spec.compile()

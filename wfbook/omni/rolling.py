@@ -1,0 +1,104 @@
+"""Chapter 12: the axes of a commanded base, and the wheels that keep to it.
+
+**Axes.** The optimal control problem is stated in axes that move with the commanded base: the origin is on
+the ground, x is ahead. The commanded twist is taken off all velocities, so a robot that drives as it should
+stands still there, and nothing in the problem depends on how far it has driven. In straight motion that is
+exact; what turning does to inertia is left to the feedback.
+
+**Wheels** follow the base by the map of chapter 9. Each also corrects its own place: wheels skid and climb,
+and no torque of a leg can bring one back that has rolled too far.
+"""
+
+import numpy as np
+import pinocchio as pin
+
+from wfbook.omni.base import Base
+from wfbook.omni.robot import WHEEL_RADIUS
+from wfbook.omni.wheels import constraint_matrix, wheel_command, wheel_velocities
+
+_PLACE_GAIN, _LARGEST_HASTE = 3.0, 0.3
+"""Of a wheel that is behind, 1/s, and the most that it is sped up, m/s."""
+_COURSE_GAIN, _LARGEST_CORRECTION = 1.0, 0.15
+"""Of all wheels off course, 1/s, and the most that the twist is changed, as a share of it."""
+_MOVING = 0.1
+"""Wheels that are slower, m/s, are not steered back: they would turn for little."""
+
+
+class Axes:
+    """Axes that move with the commanded base: on the ground's level 0, x ahead.
+
+    Args:
+        state: ``(6,)`` of the base, Paper B's X_SW.
+    """
+
+    def __init__(self, state: np.ndarray) -> None:
+        x, y, yaw = state[:3]
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        self.R = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        self.origin = np.array([x, y, 0.0])
+        self.velocity = self.R @ [state[3], state[4], 0.0]
+        self.spin = np.array([0.0, 0.0, state[5]])
+
+    def points(self, points: np.ndarray) -> np.ndarray:
+        """Return world points ``(n, 3)`` in these axes."""
+        return (points - self.origin) @ self.R
+
+    def state(self, x: np.ndarray) -> np.ndarray:
+        """Return a state ``(41,)`` as it looks from these axes, less their own motion."""
+        seen = np.array(x)
+        R_wb = pin.Quaternion(x[3:7]).toRotationMatrix()
+        R_ab = self.R.T @ R_wb
+        seen[:3] = self.points(x[:3])
+        seen[3:7] = pin.Quaternion(R_ab).coeffs()
+        lever = x[:3] - self.origin
+        carried = self.velocity + np.array([-self.spin[2] * lever[1], self.spin[2] * lever[0], 0.0])
+        seen[21:24] = x[21:24] - R_wb.T @ carried
+        seen[24:27] = x[24:27] - R_wb.T @ self.spin
+        return seen
+
+
+class Wheels:
+    """Wheels that follow a commanded base and correct their places; chapter 9's map, closed.
+
+    Args:
+        base: that is commanded; its state goes on with every :meth:`advance`.
+    """
+
+    def __init__(self, base: Base) -> None:
+        self.base = base
+        self.steering = base.steering.copy()
+        self._backward = base.backward.copy()
+
+    def advance(self, wanted: np.ndarray, dt: float) -> None:
+        """Move the commanded base on towards a wanted twist ``(3,)``."""
+        self.base.advance(wanted, dt)
+
+    def command(self, places: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """Return the wheels' rates ``(4,)``, and set :attr:`steering`.
+
+        Args:
+            places: ``(4, 3)`` of the wheels' contacts in the base's axes.
+            normals: ``(4, 3)`` of the ground there, likewise.
+        """
+        twist, positions = self.base.twist, self.base.positions
+        off = positions - places[:, :2]
+        moving = np.linalg.norm(wheel_velocities(twist, positions), axis=1).max() > _MOVING
+        if moving:
+            # Where the wheels are off course together, they are steered back.
+            course = np.array([*off.mean(axis=0), (_cross(positions, off)).sum() / (positions**2).sum()])
+            limit = _LARGEST_CORRECTION * np.abs(twist).max()
+            twist = twist + np.clip(_COURSE_GAIN * course, -limit, limit)
+            command = wheel_command(twist, positions, self.steering, self.base.backward)
+            self.steering = command.steering
+        else:
+            self.steering = self.base.steering.copy()
+        along = np.column_stack([np.cos(self.steering), np.sin(self.steering)])
+        speed = (constraint_matrix(self.steering, positions) @ self.base.twist)[4:]
+        speed = speed + np.clip(_PLACE_GAIN * (off * along).sum(axis=1), -_LARGEST_HASTE, _LARGEST_HASTE)
+        # Uphill the way is longer than it looks from above.
+        rise = -(normals[:, :2] * along).sum(axis=1) / normals[:, 2]
+        return speed * np.hypot(1.0, rise) / WHEEL_RADIUS
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]

@@ -1,0 +1,377 @@
+"""Chapter 12: the robot of paper B in MuJoCo under a controller, what it measures late and wrongly, its log.
+
+Falls, hands that do not get where they should and solutions that are not finite end a run early: they are
+noted in :attr:`OmniRun.events`, the wheels are braked, and legs and arm hold where they are, until the robot
+is at rest.
+"""
+
+import os
+import time
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Self
+
+import numpy as np
+import pinocchio as pin
+
+from wfbook import archive
+from wfbook.omni.base import Base
+from wfbook.omni.controller import FEEDBACK, ArmAlone, Command, OnWheels, WholeBody
+from wfbook.omni.costs import Weights
+from wfbook.omni.driving import Driving, holding_torques
+from wfbook.omni.locked import MOTORS, Target, nominal_target
+from wfbook.omni.robot import DAMPING, NOMINAL_HEIGHT, NU, NV, STIFFNESS, Omni, contact_offsets, posture
+from wfbook.omni.waves import LENGTH, PEAK, RUN_UP, Ground, waves
+from wfbook.terrain import Terrain
+
+CONTROLLERS = ("ddp", "ik-level", "ik-true")
+"""The paper's; and inverse kinematics of the arm that takes the trunk to be level, or knows its true pose."""
+
+FORMAT = 1
+TIMINGS = ("tick_ms_median", "tick_ms_p95", "plan_ms_median", "plan_ms_p95", "real_time_factor")
+"""Metrics that differ from run to run of one seed; they are not in the run file."""
+
+_SETTLE = 0.5
+_REST, _LONGEST_REST, _STILL = 2.0, 6.0, 0.02
+_TILT, _CROUCH = 0.6, 0.25
+_LOST, _PROGRESS, _PATIENCE = 0.15, 0.01, 0.5
+"""A hand that is further off than the first and has not come nearer by the second for the third is lost."""
+_FAILURES = 5
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Standard deviations of what is measured, white from one tick to the next.
+
+    Attributes:
+        position, rotation, velocity, spin: of the trunk: m, rad, m/s, rad/s.
+        angle, rate: of the joints: rad, rad/s.
+    """
+
+    position: float = 5e-4
+    rotation: float = 5e-4
+    velocity: float = 5e-3
+    spin: float = 2e-3
+    angle: float = 1e-4
+    rate: float = 1e-2
+
+    def disturb(
+        self, qpos: np.ndarray, qvel: np.ndarray, rng: np.random.Generator
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return a state ``(30,)``, ``(29,)`` as it is measured."""
+        qpos, qvel = qpos.copy(), qvel.copy()
+        qpos[:3] += self.position * rng.standard_normal(3)
+        turned = pin.Quaternion(*qpos[3:7]) * pin.Quaternion(pin.exp3(self.rotation * rng.standard_normal(3)))
+        qpos[3:7] = turned.coeffs()[[3, 0, 1, 2]]
+        qpos[7:] += self.angle * rng.standard_normal(NU)
+        qvel[:3] += self.velocity * rng.standard_normal(3)
+        qvel[3:6] += self.spin * rng.standard_normal(3)
+        qvel[6:] += self.rate * rng.standard_normal(NV - 6)
+        return qpos, qvel
+
+
+@dataclass(frozen=True)
+class OmniRun(Driving):
+    """A run; besides what :class:`wfbook.omni.driving.Driving` has, samples ``N`` every 10 ms.
+
+    Attributes:
+        tau: ``(N, 23)`` torques that acted.
+        hand_rotation: ``(N, 3, 3)``.
+        hand_ref: ``(N, 3)`` where the hand was to be.
+        events: what went wrong: time and text.
+        metrics: figures of merit, see :func:`metrics_of`.
+        meta: how it was run.
+    """
+
+    LOGGED: ClassVar[tuple[str, ...]] = (
+        *("t", "qpos", "qvel", "com", "hand", "p", "contact_force", "pose", "twist", "steering"),
+        *("tau", "hand_rotation", "hand_ref"),
+    )
+
+    tau: np.ndarray
+    hand_rotation: np.ndarray
+    hand_ref: np.ndarray
+    events: list[tuple[float, str]] = field(default_factory=list)
+    metrics: dict[str, Any] = field(default_factory=dict)
+    meta: dict[str, Any] = field(default_factory=dict)
+
+    def save(self, path: str | os.PathLike) -> None:
+        """Write the run file, whole or not at all.
+
+        Raises:
+            OSError: the file can't be written.
+        """
+        metrics = {name: value for name, value in self.metrics.items() if name not in TIMINGS}
+        texts = {"metrics": metrics, "meta": self.meta, "events": self.events}
+        arrays = {name: getattr(self, name) for name in self.LOGGED}
+        archive.save(path, arrays, texts | {"terrain": self.terrain.to_dict()}, FORMAT)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike) -> Self:
+        """Read a run file.
+
+        Raises:
+            ValueError: the file is no such run, is truncated, or is of another version.
+            OSError: the file can't be read.
+        """
+        texts = ("metrics", "meta", "events", "terrain")
+        data = archive.load(path, "run of part II", cls.LOGGED, texts, FORMAT)
+        data["metrics"] = dict.fromkeys(TIMINGS) | data["metrics"]
+        data["events"] = [(when, what) for when, what in data["events"]]
+        data["terrain"] = Terrain.from_dict(data["terrain"], source=f"{path}: terrain")
+        return cls(**data)
+
+
+def baseline_target() -> Target:
+    """Return the target of the arm alone on the waves: the same hand over a trunk that is carried lower.
+
+    Legs that hold their posture lift the trunk by the waves' 0.2 m. From the nominal height the arm would run
+    into its joints' limits on every crest, and what is compared would be these.
+    """
+    return nominal_target(height=NOMINAL_HEIGHT - 0.5 * PEAK)
+
+
+def run_waves(speed: float = 0.5, count: int = 5, **options: Any) -> OmniRun:
+    """Drive over the waves of Paper B's Fig. 6, from level ground to level ground.
+
+    Args:
+        speed: ahead.
+        count: of waves.
+        options: of :func:`run`; inverse kinematics gets :func:`baseline_target` if no target is given.
+    """
+    if options.get("controller", "ddp") != "ddp":
+        options = {"target": baseline_target()} | options
+    start = -RUN_UP + 0.7
+    duration = (LENGTH - 2 * start) / speed
+    return run(waves(count), [(duration, [speed, 0.0, 0.0])], start=start, **options)
+
+
+def run(
+    terrain: Terrain,
+    course: Sequence[tuple[float, Sequence[float]]],
+    controller: str = "ddp",
+    start: float = 0.0,
+    delay: float = 0.0,
+    noise: Noise | None = None,
+    seed: int = 0,
+    payload: float = 0.0,
+    trunk_mass_scale: float = 1.0,
+    push: tuple[Sequence[float], float, float] | None = None,
+    target: Target | None = None,
+    weights: Weights | None = None,
+) -> OmniRun:
+    """Simulate a run.
+
+    Args:
+        terrain: to drive on; it must be level at height 0 around the start.
+        course: wanted twists one after the other: seconds and ``(3,)``.
+        controller: one of :data:`CONTROLLERS`.
+        start: x of the robot at first; it faces along x.
+        delay: age of what the controller measures, s; it knows it.
+        noise: of what it measures; none without it.
+        seed: of the noise.
+        payload: mass in the hand that the controller does not know of, kg.
+        trunk_mass_scale: of the trunk's true mass; the controller believes in 1.
+        push: force ``(3,)`` at the trunk, when it begins, how long it lasts.
+        target: of hand and body; by default Paper B's.
+        weights: of eq. 17.
+
+    Raises:
+        ValueError: an unknown controller, or no course.
+    """
+    if controller not in CONTROLLERS:
+        raise ValueError(f"controller: {controller!r} is none of {', '.join(CONTROLLERS)}")
+    if not course or not all(duration > 0.0 for duration, _ in course):
+        raise ValueError("course: needs twists that last")
+    began = time.perf_counter()
+    target = nominal_target() if target is None else target
+    robot = Omni(terrain, trunk_mass_scale, payload)
+    qpos = posture()
+    qpos[0], qpos[2], qpos[7 + MOTORS] = start, target.height, target.posture
+    robot.reset(qpos)
+    base, ground = Base(), Ground(terrain)
+    base.state[0] = start
+    known = delay, noise, np.random.default_rng(seed)
+    driver: OnWheels
+    if controller == "ddp":
+        driver = WholeBody(ground, target, base, delay, weights)
+    else:
+        driver = ArmAlone(ground, target, base, delay, level=controller == "ik-level")
+    loop = _Loop(robot, driver, known, push)
+    loop.drive(course)
+    columns = {name: np.array([sample[name] for sample in loop.samples]) for name in loop.samples[0]}
+    meta = {
+        "controller": controller,
+        "delay": delay,
+        "noise": noise is not None,
+        "seed": seed,
+        "payload": payload,
+        "payload_estimate": driver.ocp.payload if isinstance(driver, WholeBody) else None,
+        "trunk_mass_scale": trunk_mass_scale,
+        "course": [[float(duration), [float(v) for v in twist]] for duration, twist in course],
+    }
+    result = OmniRun(**columns, terrain=terrain, events=loop.events, meta=meta)
+    elapsed = time.perf_counter() - began
+    result.metrics.update(metrics_of(result, target) | loop.timings(elapsed))
+    return result
+
+
+class _Loop:
+    """The simulation's loop: physics at 1 kHz, the controller at 500 Hz, samples at 100 Hz."""
+
+    def __init__(
+        self,
+        robot: Omni,
+        driver: OnWheels,
+        known: tuple[float, Noise | None, np.random.Generator],
+        push: tuple[Sequence[float], float, float] | None,
+    ) -> None:
+        self.robot, self.driver, self.push = robot, driver, push
+        self.delay, self.noise, self.rng = known
+        self.past = deque(maxlen=1 + round(1000 * self.delay))
+        self.samples: list[dict[str, Any]] = []
+        self.events: list[tuple[float, str]] = []
+        self.times: list[float] = []
+        self.command: Command | None = None
+        self.tau = np.zeros(NU)
+        self._astray = self._failures = 0
+        self._nearest = np.inf
+
+    def drive(self, course: Sequence[tuple[float, Sequence[float]]]) -> None:
+        """Settle, follow the course, and stop; or stop when something goes wrong."""
+        ends = np.cumsum([duration for duration, _ in course])
+        twists = np.array([twist for _, twist in course], dtype=float)
+        stop, step, data = float(ends[-1]), -round(1000 * _SETTLE), self.robot.data
+        while True:
+            t = step / 1000
+            if self.events:
+                stop = min(stop, t)
+            moving = bool(self.events) and np.abs(data.qvel[:6]).max() > _STILL
+            if t >= stop + (_LONGEST_REST if moving else _REST):
+                return
+            leg = int(np.searchsorted(ends, t, side="right")) if t >= 0.0 else len(twists)
+            self._step(step, twists[leg] if leg < len(twists) else np.zeros(3))
+            step += 1
+
+    def _step(self, step: int, wanted: np.ndarray) -> None:
+        """Simulate a millisecond."""
+        robot, t = self.robot, step / 1000
+        self.past.append((robot.data.qpos.copy(), robot.data.qvel.copy()))
+        if step % round(1000 * FEEDBACK) == 0 and not self.events:
+            qpos, qvel = self.past[0]
+            if self.noise is not None:
+                qpos, qvel = self.noise.disturb(qpos, qvel, self.rng)
+            began = time.perf_counter()
+            self.command = self.driver.tick(qpos, qvel, wanted)
+            self.times.append(time.perf_counter() - began)
+            trouble = self._trouble()
+            if trouble is not None:
+                self.events.append((t, trouble))
+                self.command = self._halt()
+        if self.push is not None:
+            force, begin, duration = self.push
+            robot.push(np.asarray(force, float) * (begin <= t < begin + duration))
+        command, data = self.command, robot.data
+        self.tau = command.torques + command.stiffness * (command.angles - data.qpos[7:])
+        self.tau = self.tau + command.damping * (command.rates - data.qvel[6:])
+        robot.step(self.tau)
+        if step >= 0 and step % 10 == 0:
+            self.samples.append(self._sample(t))
+
+    def _trouble(self) -> str | None:
+        """Return what is wrong, if anything."""
+        data, driver = self.robot.data, self.driver
+        _w, x, y, _z = data.qpos[3:7]
+        level = self.robot.centres[:, 2].mean() - 0.085
+        if np.arccos(np.clip(1.0 - 2.0 * (x * x + y * y), -1.0, 1.0)) > _TILT:
+            return "fallen: the trunk is tipped over"
+        if data.qpos[2] - level < _CROUCH or self.robot.touches_with_hull():
+            return "fallen: the trunk is on the ground"
+        self._failures = 0 if driver.solved else self._failures + 1
+        if self._failures > _FAILURES or not np.isfinite(self.command.torques).all():
+            return "the optimal control problem has no finite solution"
+        off = np.linalg.norm(self._hand_ref() - self.robot.hand[0])
+        self._astray += 1
+        if off < max(_LOST, self._nearest - _PROGRESS):
+            self._nearest, self._astray = off, 0
+        if isinstance(driver, WholeBody) and self._astray > _PATIENCE / FEEDBACK:
+            return f"the hand is {off:.2f} m from where it should be: out of reach"
+        return None
+
+    def _halt(self) -> Command:
+        """Return the command that brings the robot to rest: brakes, and joints that hold where they are.
+
+        A robot that has fallen holds on weakly and carries nothing.
+        """
+        angles, fallen = np.array(self.robot.data.qpos[7:]), "fallen" in self.events[-1][1]
+        torques = np.zeros(NU) if fallen else holding_torques(self.robot.data.qpos)
+        return Command(torques, angles, np.zeros(NU), (0.3 if fallen else 1.0) * STIFFNESS, DAMPING)
+
+    def _hand_ref(self) -> np.ndarray:
+        """Return where the hand should be in the world, ``(3,)``."""
+        x, y, yaw = self.driver.wheels.base.state[:3]
+        ahead, left, up = self.driver.target.hand
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        return np.array([x + cos * ahead - sin * left, y + sin * ahead + cos * left, up])
+
+    def _sample(self, t: float) -> dict[str, Any]:
+        """Return one sample of each array of :class:`OmniRun`."""
+        robot, data, base = self.robot, self.robot.data, self.driver.wheels.base
+        normals = self.driver.ground.below(robot.centres)[1]
+        hand, rotation = robot.hand
+        return {
+            "t": t,
+            "qpos": data.qpos.copy(),
+            "qvel": data.qvel.copy(),
+            "com": data.subtree_com[1].copy(),
+            "hand": hand,
+            "p": robot.centres + contact_offsets(robot.axles, normals),
+            "contact_force": robot.contact_wrenches()[:, :3],
+            "pose": base.state[:3].copy(),
+            "twist": base.twist,
+            "steering": self.driver.wheels.steering.copy(),
+            "tau": np.clip(self.tau, -robot.efforts, robot.efforts),
+            "hand_rotation": rotation,
+            "hand_ref": self._hand_ref(),
+        }
+
+    def timings(self, elapsed: float) -> dict[str, float]:
+        """Return computing times: of every tick, of those that solve, and of all against the robot's."""
+        ticks, every = 1e3 * np.array(self.times), 10
+        plans = ticks[::every]
+        return {
+            "tick_ms_median": float(np.median(ticks)),
+            "tick_ms_p95": float(np.percentile(ticks, 95)),
+            "plan_ms_median": float(np.median(plans)),
+            "plan_ms_p95": float(np.percentile(plans, 95)),
+            "real_time_factor": float(len(self.times) * FEEDBACK / elapsed),
+        }
+
+
+def metrics_of(run: OmniRun, target: Target) -> dict[str, Any]:
+    """Return a run's figures of merit.
+
+    ``hand_height_*`` are of the hand above the level ground at the start, in metres; ``hand_turn_max_rad``
+    is the largest angle between the hand and how it should be turned, the base's yaw aside;
+    ``rest_speed_m_s`` the fastest that the trunk moved in the last tenth of a second.
+    """
+    height = run.hand[:, 2]
+    yaws = run.pose[:, 2]
+    turns = [
+        np.linalg.norm(pin.log3((pin.utils.rotate("z", yaw) @ target.hand_rotation).T @ rotation))
+        for yaw, rotation in zip(yaws, run.hand_rotation, strict=True)
+    ]
+    error = run.hand - run.hand_ref
+    return {
+        "hand_height_mean_m": float(height.mean()),
+        "hand_height_std_m": float(height.std()),
+        "hand_height_max_error_m": float(np.abs(error[:, 2]).max()),
+        "hand_level_max_error_m": float(np.linalg.norm(error[:, :2], axis=1).max()),
+        "hand_turn_max_rad": float(max(turns)),
+        "distance_m": float(np.linalg.norm(run.qpos[-1, :2] - run.qpos[0, :2])),
+        "upright": not any("fallen" in what for _, what in run.events),
+        "finished": not run.events,
+        "rest_speed_m_s": float(np.abs(run.qvel[-10:, :3]).max()),
+        "events": [f"{when:.2f} s: {what}" for when, what in run.events],
+    }
