@@ -48,6 +48,8 @@ class Constraints:
             friction: ``(4, n)`` rows of the pyramids; the last of each says that the leg pushes.
             torques: rows of the motors' limits.
         """
+        if self == _ALL_KEPT:  # at every tick but a lesson's
+            return
         moving = np.where(ref.wheels, not self.wheels, not self.feet)
         rows = 6 + np.flatnonzero(np.repeat(moving, 3))
         lower[rows], upper[rows] = -np.inf, np.inf
@@ -57,6 +59,9 @@ class Constraints:
             upper[friction[ref.stance, -1]] = np.inf
         if not self.torques:
             lower[torques], upper[torques] = -np.inf, np.inf
+
+
+_ALL_KEPT = Constraints()
 
 
 @dataclass(frozen=True)
@@ -102,7 +107,7 @@ class Gains:
     least_force: float = 3.0
     force_weight: float = 1e-3
     acceleration_weight: float = 1e-4
-    constraints: Constraints = Constraints()
+    constraints: Constraints = _ALL_KEPT
 
 
 @dataclass(frozen=True)
