@@ -138,7 +138,7 @@ def test_what_is_left_out_is_out():
 
 
 def test_nothing_is_simulated_before_the_button(experiment):
-    assert experiment.told == [] and "press simulate" in experiment.status.value
+    assert experiment.told == [] and "press Simulate" in experiment.status.value
     assert not experiment.pictures
     experiment.button.click()
     assert experiment.told == [experiment.setting] and "stayed upright" in experiment.status.value
@@ -165,7 +165,7 @@ def test_another_setting_takes_the_pictures_away_and_the_old_one_brings_them_bac
     experiment.button.click()
     experiment.delay.value = 20.0
     assert not experiment.pictures and experiment.replay.value == ""
-    assert "20 ms" in experiment.status.value and "press simulate" in experiment.status.value
+    assert "20 ms" in experiment.status.value and "press Simulate" in experiment.status.value
     experiment.delay.value = 9.0
     assert set(experiment.pictures) == {"limits", "tracking"} and len(experiment.told) == 1
 
@@ -185,7 +185,7 @@ def test_an_error_is_shown_and_the_button_works_again():
 
     widget = Experiment(simulator=broken)
     with pytest.raises(RuntimeError):
-        widget._simulate()
+        widget._pressed()
     assert "no &lt;robot&gt;" in widget.status.value and not widget.button.disabled
 
 

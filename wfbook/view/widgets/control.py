@@ -15,10 +15,10 @@ from wfbook.stance import Stance, limits_reached, stand
 from wfbook.terrain import flat
 from wfbook.view import figures
 from wfbook.view.drawings import control as drawings
-from wfbook.view.replay import Replay
 from wfbook.view.style import LIMIT, MEASURED, PLANNED, Picture, tidy
 from wfbook.view.widgets.board import Board
-from wfbook.view.widgets.panel import Panel, table
+from wfbook.view.widgets.panel import Panel
+from wfbook.view.widgets.simulating import Simulating, Told, verdict
 from wfbook.wbc import Command, WholeBodyController
 
 if TYPE_CHECKING:
@@ -278,7 +278,7 @@ def simulated(setting: Setting, progress: Callable[[float, float], None] | None 
     )
 
 
-class Experiment(Panel):
+class Experiment(Simulating):
     """A motion, a push, a delay and a program with holes: *simulate*, and see whether the robot bears it.
 
     Args:
@@ -309,14 +309,8 @@ class Experiment(Panel):
         self.switches = self._switches.boxes
         for name in setting.left_out:
             self.switches[name].value = False
-        self.button = ipywidgets.Button(description="simulate", button_style="primary")
-        self.button.on_click(self._simulate)
-        self.run: Run | None = None
-        self.results: dict[Setting, Run] = {}
-        self.history, self.replay = ipywidgets.HTML(), ipywidgets.HTML()
         controls = [self.motion, self.delay, self.push, self.direction, self.start, *self.switches.values()]
-        super().__init__([*controls, self.button], ["limits", "tracking"])
-        self.children = (*self.children[:2], self.history, self.replay, *self.children[2:])
+        super().__init__(controls, ["limits", "tracking"], _COLUMNS)
 
     @property
     def setting(self) -> Setting:
@@ -330,68 +324,40 @@ class Experiment(Panel):
             self.start.value,
         )
 
-    def redraw(self) -> None:
-        """Show the run of this very setting; if there is none, say how to make it."""
-        run = self.results.get(self.setting)
-        if run is None:
-            self._clear()
-            self.say(f"{self.setting.describe()}: press simulate.")
-        elif run is not self.run:
-            self._show(run)
+    @property
+    def asked(self) -> Setting:
+        """The same: what a run is remembered by."""
+        return self.setting
 
-    def simulate(self) -> "Run":
-        """Simulate the setting, or take its run from memory, and show it."""
-        setting = self.setting
-        if setting not in self.results:
-            self.results[setting] = self._simulator(setting, self._report)
-            self.history.value = table(_COLUMNS, [_row(s, r) for s, r in self.results.items()])
-        self._show(self.results[setting])
-        return self.results[setting]
+    def run_of(self, asked: Setting, told: Told) -> "Run":
+        """Simulate a setting."""
+        return self._simulator(asked, told)
 
-    def _simulate(self, _button: object = None) -> None:
-        self.button.disabled = True
-        try:
-            self.simulate()
-        except Exception as error:
-            # A widget's errors go to a log that few readers open.
-            self._clear()
-            self.warn(f"{type(error).__name__}: {error}")
-            raise
-        finally:
-            self.button.disabled = False
+    def preview(self) -> None:
+        """Say how to get a run of this setting."""
+        self.say(f"{self.setting.describe()}: press Simulate.")
 
-    def _report(self, time: float, total: float) -> None:
-        self.say(f"simulating … {time:.1f} of {total:.1f} s")
-
-    def _clear(self) -> None:
-        self.run, self.replay.value = None, ""
-        self.pictures.clear()
-        for view in self.views.values():
-            view.value = ""
-
-    def _show(self, run: "Run") -> None:
-        self.run = run
+    def draw(self, run: "Run") -> None:
+        """Show a run beside its limits and its errors."""
         fall = run.metrics["fall_time_s"]
-        verdict = "stayed upright" if fall is None else f"fell after {fall:.2f} s"
-        self.say(f"{self.setting.describe()}: {verdict}.")
-        self.replay.value = Replay(run, height=360)._repr_html_()
+        end = "stayed upright" if fall is None else f"fell after {fall:.2f} s"
+        self.say(f"{self.setting.describe()}: {end}.")
         self.show("limits", drawings.limits(run), "torques and friction beside their limits")
         self.show("tracking", figures.tracking(run), "errors of the centre of mass and the attitude")
 
+    def row(self, asked: Setting, run: "Run") -> tuple[str, ...]:
+        """Return a line of the table."""
+        after = run.t >= 0.0
+        error = 1e3 * np.linalg.norm((run.com - run.com_ref)[after], axis=1).max()
+        tilt = np.degrees(np.abs((run.rpy - run.rpy_ref)[after, :2]).max())
+        return (
+            asked.describe(),
+            verdict(run),
+            f"{error:.0f} mm",
+            f"{tilt:.1f}°",
+            f"{np.abs(run.tau).max():.1f} N m",
+            f"{run.metrics['qp_rescues']}",
+        )
+
 
 _COLUMNS = ("setting", "", "CoM error", "tilt", "largest torque", "ticks by DAQP")
-
-
-def _row(setting: Setting, run: "Run") -> tuple[str, ...]:
-    fall = run.metrics["fall_time_s"]
-    after = run.t >= 0.0
-    error = 1e3 * np.linalg.norm((run.com - run.com_ref)[after], axis=1).max()
-    tilt = np.degrees(np.abs((run.rpy - run.rpy_ref)[after, :2]).max())
-    return (
-        setting.describe(),
-        "upright" if fall is None else f"fell, {fall:.2f} s",
-        f"{error:.0f} mm",
-        f"{tilt:.1f}°",
-        f"{np.abs(run.tau).max():.1f} N m",
-        f"{run.metrics['qp_rescues']}",
-    )

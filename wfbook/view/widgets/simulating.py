@@ -1,4 +1,4 @@
-"""What chapter 8's widgets share: a button that simulates, a replay, and a table that fills with each run."""
+"""What the widgets of chapters 6 and 8 share: a button that simulates, a replay, a table of all runs."""
 
 from collections.abc import Callable, Hashable, Sequence
 from typing import TYPE_CHECKING, Any
@@ -87,10 +87,7 @@ class Simulating(Panel):
         if run is not None:
             self._show(run)
             return
-        self.run, self.replay.value = None, ""
-        self.pictures.clear()
-        for view in self.views.values():
-            view.value = ""
+        self._clear()
         self.preview()
 
     def simulate(self) -> "Run":
@@ -116,6 +113,7 @@ class Simulating(Panel):
             self.simulate()
         except Exception as error:
             # A widget's errors go to a log that few readers open.
+            self._clear()
             self.warn(f"{type(error).__name__}: {error}")
             raise
         finally:
@@ -123,6 +121,13 @@ class Simulating(Panel):
 
     def _report(self, time: float, total: float) -> None:
         self.say(f"simulating … {time:.1f} of {total:.1f} s")
+
+    def _clear(self) -> None:
+        """Take away what belongs to another run."""
+        self.run, self.replay.value = None, ""
+        self.pictures.clear()
+        for view in self.views.values():
+            view.value = ""
 
     def _tell(self) -> None:
         rows = [self.row(asked, run) for asked, run in self.results.items()]
