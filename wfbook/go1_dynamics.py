@@ -17,6 +17,7 @@ order of joints        of the file                 found by name
 =====================  ==========================  =======================
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -95,7 +96,50 @@ def contact_offsets(axles: np.ndarray, normals: np.ndarray, wheels: np.ndarray) 
     return np.where(wheels[:, None], wheel, foot)
 
 
-class Go1Dynamics:
+class FloatingBase:
+    """A robot with a floating base in Pinocchio, and what has to be translated to and from MuJoCo.
+
+    Args:
+        model: Pinocchio's.
+        joints: their names in MuJoCo's order, one degree of freedom each.
+
+    Attributes:
+        model, data: Pinocchio's.
+        mass: of the whole robot.
+    """
+
+    def __init__(self, model: pin.Model, joints: Sequence[str]) -> None:
+        self.model, self.data = model, model.createData()
+        ids = [model.getJointId(name) for name in joints]
+        self._v_index = np.array([*range(6), *(model.idx_vs[j] for j in ids)])
+        self._q_index = np.array([*range(7), *(model.idx_qs[j] for j in ids)])
+        self.mass = pin.computeTotalMass(model)
+
+    def state(self, qpos: np.ndarray, qvel: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Translate a MuJoCo state, configuration ``(nq,)`` and velocity ``(nv,)``, to Pinocchio's."""
+        q, v = np.empty(len(qpos)), np.empty(len(qvel))
+        q[self._q_index] = qpos
+        q[3:7] = qpos[[4, 5, 6, 3]]
+        v[self._v_index] = qvel
+        v[:3] = pin.Quaternion(q[3:7]).toRotationMatrix().T @ qvel[:3]
+        return q, v
+
+    def mujoco_state(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Translate a Pinocchio state, ``(nq,)`` and ``(nv,)``, to MuJoCo's."""
+        qpos, qvel = q[self._q_index], v[self._v_index]
+        qpos[3:7] = q[[6, 3, 4, 5]]
+        qvel[:3] = pin.Quaternion(q[3:7]).toRotationMatrix() @ v[:3]
+        return qpos, qvel
+
+    def acceleration(self, qpos: np.ndarray, qvel: np.ndarray, qacc: np.ndarray) -> np.ndarray:
+        """Translate a MuJoCo acceleration ``(nv,)`` to Pinocchio's base, joints in MuJoCo's order."""
+        q, v = self.state(qpos, qvel)
+        a = np.array(qacc, dtype=float)
+        a[:3] = pin.Quaternion(q[3:7]).toRotationMatrix().T @ qacc[:3] - cross(v[3:6], v[:3])
+        return a
+
+
+class Go1Dynamics(FloatingBase):
     """Mass matrix, bias forces and contact kinematics at one state.
 
     Call :meth:`update`, then read the attributes. ``w`` in a name is the world frame, ``b`` the trunk's;
@@ -122,12 +166,9 @@ class Go1Dynamics:
     """
 
     def __init__(self, path: Path = ASSETS / "go1.xml") -> None:
-        self.model = pin.buildModelFromMJCF(str(path))
-        self.data = self.model.createData()
         names = [f"{leg}_{part}_joint" for leg in LEGS for part in ("hip", "thigh", "calf", "wheel")]
+        super().__init__(pin.buildModelFromMJCF(str(path)), names)
         joints = [self.model.getJointId(name) for name in names]
-        self._v_index = np.array([*range(6), *(self.model.idx_vs[j] for j in joints)])
-        self._q_index = np.array([*range(7), *(self.model.idx_qs[j] for j in joints)])
         self._calves, self._wheels = joints[2::4], joints[3::4]
         self._columns = self._v_index[_KEPT]
         # CRBA fills in the upper triangle alone; stored by columns, it is the lower one of the transpose.
@@ -137,27 +178,9 @@ class Go1Dynamics:
         self._mask[:, :, :6] = 1.0
         for leg in range(4):
             self._mask[leg, :, 6 + 3 * leg : 9 + 3 * leg] = 1.0
-        self.mass = pin.computeTotalMass(self.model)
         self.effort = np.array([self.model.effortLimit[i] for i in self._v_index[MOTORS]])
         self.lower = self.model.lowerPositionLimit[self._q_index[MOTORS + 1]]
         self.upper = self.model.upperPositionLimit[self._q_index[MOTORS + 1]]
-
-    def state(self, qpos: np.ndarray, qvel: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Translate a MuJoCo state, ``(23,)`` and ``(22,)``, to Pinocchio's."""
-        q, v = np.empty(23), np.empty(22)
-        q[self._q_index] = qpos
-        q[3:7] = qpos[[4, 5, 6, 3]]
-        R_wb = pin.Quaternion(q[3:7]).toRotationMatrix()
-        v[self._v_index] = qvel
-        v[:3] = R_wb.T @ qvel[:3]
-        return q, v
-
-    def acceleration(self, qpos: np.ndarray, qvel: np.ndarray, qacc: np.ndarray) -> np.ndarray:
-        """Translate a MuJoCo acceleration ``(22,)`` to Pinocchio's base, joints in MuJoCo's order."""
-        q, v = self.state(qpos, qvel)
-        a = np.array(qacc, dtype=float)
-        a[:3] = pin.Quaternion(q[3:7]).toRotationMatrix().T @ qacc[:3] - cross(v[3:6], v[:3])
-        return a
 
     def update(self, qpos: np.ndarray, qvel: np.ndarray) -> None:
         """Compute everything at a MuJoCo state.

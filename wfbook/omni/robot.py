@@ -24,7 +24,7 @@ import numpy as np
 import pinocchio as pin
 
 from wfbook.go1 import add_ground
-from wfbook.go1_dynamics import cross
+from wfbook.go1_dynamics import FloatingBase, cross
 from wfbook.modes import LEGS
 
 if TYPE_CHECKING:
@@ -299,7 +299,7 @@ def locked_model(qpos: np.ndarray | None = None) -> pin.Model:
     return pin.buildReducedModel(full.model, joints, q)
 
 
-class OmniDynamics:
+class OmniDynamics(FloatingBase):
     """Mass matrix, bias forces and kinematics at one state, from Pinocchio.
 
     Call :meth:`update`, then read the attributes and ask for frames. Joints are in MuJoCo's order, the
@@ -316,36 +316,8 @@ class OmniDynamics:
     """
 
     def __init__(self) -> None:
-        self.model = pinocchio_model()
-        self.data = self.model.createData()
-        ids = [self.model.getJointId(name) for name in JOINTS]
-        self._v_index = np.array([*range(6), *(self.model.idx_vs[j] for j in ids)])
-        self._q_index = np.array([*range(7), *(self.model.idx_qs[j] for j in ids)])
-        self.mass = pin.computeTotalMass(self.model)
+        super().__init__(pinocchio_model(), JOINTS)
         self.efforts = np.array(self.model.effortLimit)[self._v_index[6:]]
-
-    def state(self, qpos: np.ndarray, qvel: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Translate a MuJoCo state, ``(30,)`` and ``(29,)``, to Pinocchio's."""
-        q, v = np.empty(NQ), np.empty(NV)
-        q[self._q_index] = qpos
-        q[3:7] = qpos[[4, 5, 6, 3]]
-        v[self._v_index] = qvel
-        v[:3] = pin.Quaternion(q[3:7]).toRotationMatrix().T @ qvel[:3]
-        return q, v
-
-    def mujoco_state(self, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Translate a Pinocchio state, ``(30,)`` and ``(29,)``, to MuJoCo's."""
-        qpos, qvel = q[self._q_index], v[self._v_index]
-        qpos[3:7] = q[[6, 3, 4, 5]]
-        qvel[:3] = pin.Quaternion(q[3:7]).toRotationMatrix() @ v[:3]
-        return qpos, qvel
-
-    def acceleration(self, qpos: np.ndarray, qvel: np.ndarray, qacc: np.ndarray) -> np.ndarray:
-        """Translate a MuJoCo acceleration ``(29,)`` to Pinocchio's base, joints in MuJoCo's order."""
-        q, v = self.state(qpos, qvel)
-        a = np.array(qacc, dtype=float)
-        a[:3] = pin.Quaternion(q[3:7]).toRotationMatrix().T @ qacc[:3] - cross(v[3:6], v[:3])
-        return a
 
     def update(self, qpos: np.ndarray, qvel: np.ndarray) -> None:
         """Compute everything at a MuJoCo state, ``(30,)`` and ``(29,)``."""
