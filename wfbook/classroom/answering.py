@@ -6,6 +6,7 @@ import os
 import pickle
 import socket
 import sys
+import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
@@ -59,6 +60,7 @@ def serve(
         os.closerange(3, keep)
         os.closerange(keep + 1, os.sysconf("SC_OPEN_MAX"))
         os.chdir(folder)
+        tempfile.tempdir = str(folder)
         fence.limit(memory, int(seconds))
         if fenced:
             fence.close(folder)

@@ -13,7 +13,6 @@ FOLDER = Path(__file__).parent.parent.parent / "notebooks"
 """Where the chapters are."""
 
 _WORD = re.compile(r"\b[^\W\d]\w*")
-_HEADING = re.compile(r"^(?:#+ |\*\*)(?:Exercise )?\d+[.:]", re.MULTILINE)
 _CHECK = "-check"
 
 
@@ -99,13 +98,6 @@ class Chapter:
         """Positions of the code cells that belong to no exercise."""
         cells = enumerate(self.cells)
         return tuple(position for position, cell in cells if cell.kind == "code" and not cell.role)
-
-    @property
-    def first_exercise(self) -> int:
-        """Position of the cell that sets the first exercise."""
-        end = self.exercises[0].answers[0]
-        set_by = [i for i, cell in enumerate(self.cells[:end]) if _HEADING.search(cell.source)]
-        return set_by[-1] if set_by else end
 
 
 def chapters(folder: Path = FOLDER) -> tuple[Chapter, ...]:

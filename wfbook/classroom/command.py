@@ -147,11 +147,7 @@ def grade_submissions(arguments: argparse.Namespace) -> int:
                         continue
                     found.append(result)
                     done = len(found) - len(work.marks)
-                    left = (time.monotonic() - began) / done * (asked_for - done)
-                    line.show(
-                        f"{done} of {asked_for} answers of {work.students} students, {result.chapter}, "
-                        f"{int(left) // 60}:{int(left) % 60:02d} min left"
-                    )
+                    line.show(f"{done} of {asked_for} answers of {work.students} students, {result.chapter}")
                     if time.monotonic() > written + _EVERY:
                         marks.write(out, found)
                         written = time.monotonic()

@@ -9,10 +9,11 @@ import binascii
 import dataclasses
 import importlib
 import json
+import numbers
 import socket
 import struct
 import time
-from collections.abc import Callable
+from collections.abc import Callable, KeysView, ValuesView
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ LARGEST = 64 * 2**20
 _LENGTH = struct.Struct("!Q")
 _SEQUENCES = {"list": list, "tuple": tuple, "set": set, "frozenset": frozenset}
 _DEPTH = 40
+_BITS = 4096
 _OURS = "wfbook."
 
 
@@ -49,34 +51,36 @@ def encode(value: Any, keep: Callable[[Any], int], depth: int = 0) -> Any:
 
     Args:
         value: numbers, texts, arrays, wfbook's dataclasses, functions, and lists, tuples, sets and
-            dictionaries of them; what else there is becomes :class:`Unknown`.
+            dictionaries of them. What is derived from one of these becomes one, and anything else
+            :class:`Unknown`.
         keep: keeps a function, and returns the number it is called by.
         depth: of this value in another.
     """
     kind = type(value)
     if depth > _DEPTH:
         return {"unknown": kind.__name__}
-    if value is None or kind in (bool, str, float) or (kind is int and value.bit_length() < 4096):
-        return value
     if isinstance(value, np.ndarray | np.generic) and np.asarray(value).dtype.kind in "biufcUS":
         array = np.asarray(value)
         data = base64.b64encode(np.ascontiguousarray(array).tobytes()).decode()
-        return {
-            "array": data,
-            "type": array.dtype.str,
-            "shape": array.shape,
-            "scalar": isinstance(value, np.generic),
-        }
-    if kind is complex:
+        scalar = isinstance(value, np.generic)
+        return {"array": data, "type": array.dtype.str, "shape": array.shape, "scalar": scalar}
+    if value is None or isinstance(value, bool):
+        return value
+    if isinstance(value, int) and value.bit_length() < _BITS:
+        return int(value)
+    if isinstance(value, numbers.Real | str):
+        return str(value) if isinstance(value, str) else float(value)
+    if isinstance(value, complex):
         return {"complex": [value.real, value.imag]}
-    if kind is bytes:
+    if isinstance(value, bytes):
         return {"bytes": base64.b64encode(value).decode()}
-    if kind.__name__ in _SEQUENCES and kind is _SEQUENCES[kind.__name__]:
-        return {kind.__name__: [encode(entry, keep, depth + 1) for entry in value]}
-    if kind in (range, type({}.keys()), type({}.values())):
-        return {"list": [encode(entry, keep, depth + 1) for entry in value]}
-    if kind is dict:
+    if isinstance(value, dict):
         return {"dict": [[encode(k, keep, depth + 1), encode(v, keep, depth + 1)] for k, v in value.items()]}
+    for name, sequence in _SEQUENCES.items():
+        if isinstance(value, sequence):
+            return {name: [encode(entry, keep, depth + 1) for entry in value]}
+    if isinstance(value, range | KeysView | ValuesView):
+        return {"list": [encode(entry, keep, depth + 1) for entry in value]}
     if dataclasses.is_dataclass(kind) and kind.__module__.startswith(_OURS):
         fields = {
             field.name: encode(getattr(value, field.name), keep, depth + 1)
