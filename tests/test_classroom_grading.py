@@ -204,7 +204,7 @@ def test_a_chapter_that_fails_itself_is_told(tiny, capsys):
     tiny.teach("half = 5.0", "half = 1 / 0")
     assert main(["grade", "subs"]) == 1
     assert "wfbook: 42_tiny: cell 3 raises ZeroDivisionError: division by zero" in capsys.readouterr().err
-    assert [row["verdict"] for row in rows("marks.csv")] == ["right"]
+    assert [row["verdict"] for row in rows("marks.csv")] == ["right", "not graded"]
 
 
 def test_without_a_fence_nothing_runs_unless_it_is_asked_for(tiny, monkeypatch, capsys):

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import wfbook
-from wfbook.classroom.chapters import Chapter, Exercise
+from wfbook.classroom.chapters import Cell, Chapter, Exercise
 from wfbook.classroom.copies import student_sources
 from wfbook.classroom.judge import EMPTY, RIGHT, Limits
 from wfbook.classroom.marks import Mark
@@ -27,8 +27,8 @@ from wfbook.classroom.submissions import (
     read,
 )
 
-MISSING, UNREADABLE, ELSEWHERE = "missing", "unreadable", "wrong chapter"
-"""Verdicts about what is no answer at all."""
+MISSING, UNREADABLE, ELSEWHERE, UNGRADED = "missing", "unreadable", "wrong chapter", "not graded"
+"""Verdicts about what is no answer at all, and about answers to a chapter that fails itself."""
 
 
 class ChapterError(Exception):
@@ -57,6 +57,25 @@ class Assignment:
         return sum(map(len, self.answers.values()))
 
 
+@dataclass(frozen=True)
+class Looked:
+    """A file that was read.
+
+    Attributes:
+        path: of the file.
+        chapter: that its name tells, or else its cells; None if neither does.
+        cells: its cells.
+        verdict: about a file without answers; else empty.
+        message: why.
+    """
+
+    path: Path
+    chapter: Chapter | None
+    cells: tuple[Cell, ...] = ()
+    verdict: str = ""
+    message: str = ""
+
+
 def assignment(folder: Path, every: Sequence[Chapter], asked: Sequence[Chapter] | None) -> Assignment:
     """Read all submissions into memory, so that nothing that runs later can change one.
 
@@ -74,34 +93,21 @@ def assignment(folder: Path, every: Sequence[Chapter], asked: Sequence[Chapter] 
         raise ValueError(f"{str(folder)!r} holds no notebooks: one sub-folder or .ipynb file a student")
     work = Assignment(tuple(asked or every), students=len({s.student for s in submissions}))
     sources = {chapter: student_sources(chapter) for chapter in work.chapters}
-    handed_in: dict[tuple[str, Chapter], list[tuple[Submission, Any]]] = {}
+    handed_in: dict[tuple[str, Chapter], list[Looked]] = {}
     for submission in submissions:
-        chapter, cells, message = submission.chapter, None, ""
-        try:
-            cells = read(submission.path)
-            inside = chapter_of(cells, every)
-            chapter = chapter or inside
-            if inside is None:
-                message = "it has no cell with an answer of a chapter"
-            elif inside is not chapter:
-                message, cells = f"it holds answers of {inside.name}", None
-        except UnreadableError as error:
-            message = str(error)
-        if chapter is None:
-            text = f"{submission.path.name}: {message}"
-            work.marks.append(Mark(submission.student, "", "", 0.0, 0.0, UNREADABLE, text))
-        elif chapter in work.chapters:
-            handed_in.setdefault((submission.student, chapter), []).append((submission, cells or message))
+        seen = _looked_at(submission, every)
+        if seen.chapter is None:
+            work.marks.append(Mark(submission.student, "", "", 0.0, 0.0, seen.verdict, seen.message))
+        elif seen.chapter in work.chapters:
+            handed_in.setdefault((submission.student, seen.chapter), []).append(seen)
     for (student, chapter), files in handed_in.items():
-        files.sort(key=lambda file: file[0].path.lstat().st_mtime)
-        submission, content = files[-1]
-        remark = f"; {len(files)} files, {submission.path.name} is the newest" if len(files) > 1 else ""
-        if isinstance(content, str):
-            verdict = ELSEWHERE if content.startswith("it holds answers") else UNREADABLE
-            text = f"{submission.path.name}: {content}{remark}"
-            work.marks += [_mark(student, chapter, e, verdict, text) for e in chapter.exercises]
+        seen = max(files, key=lambda file: file.path.lstat().st_mtime)
+        remark = f"; {len(files)} files, {seen.path.name} is the newest" if len(files) > 1 else ""
+        if seen.verdict:
+            text = f"{seen.message}{remark}"
+            work.marks += [_mark(student, chapter, e, seen.verdict, text) for e in chapter.exercises]
             continue
-        for answer in answers(content, chapter, sources[chapter]):
+        for answer in answers(seen.cells, chapter, sources[chapter]):
             if not answer.cells:
                 text = f"its cell is not in the notebook{remark}"
                 work.marks.append(_mark(student, chapter, answer.exercise, MISSING, text))
@@ -119,6 +125,20 @@ def assignment(folder: Path, every: Sequence[Chapter], asked: Sequence[Chapter] 
     return work
 
 
+def _looked_at(submission: Submission, every: Sequence[Chapter]) -> Looked:
+    path, named = submission.path, submission.chapter
+    try:
+        cells = read(path)
+    except UnreadableError as error:
+        return Looked(path, named, verdict=UNREADABLE, message=f"{path.name}: {error}")
+    inside = chapter_of(cells, every)
+    if inside is None and named is None:
+        return Looked(path, None, verdict=ELSEWHERE, message=f"{path.name}: no chapter's answers are in it")
+    if inside is None or named in (None, inside):
+        return Looked(path, named or inside, cells)
+    return Looked(path, named, verdict=ELSEWHERE, message=f"{path.name}: it holds answers of {inside.name}")
+
+
 def graded(work: Assignment, limits: Limits, at_once: int, salt: int) -> Iterator[Mark | str]:
     """Run what is to be run.
 
@@ -132,20 +152,31 @@ def graded(work: Assignment, limits: Limits, at_once: int, salt: int) -> Iterato
         Marks as they come, and lines that say what is going on.
 
     Raises:
-        ChapterError: a chapter fails before its answers do.
+        ChapterError: chapters failed before their answers did; the others' answers have their marks by then.
     """
+    failures = []
     for chapter in work.chapters:
-        if chapter in work.answers:
-            with tempfile.TemporaryDirectory(prefix="wfbook-grade-") as folder:
-                (Path(folder) / "salt").write_text(str(salt))
-                yield from _chapter(chapter, work.answers[chapter], limits, at_once, Path(folder))
+        waiting = dict(enumerate(work.answers.get(chapter, ())))
+        if not waiting:
+            continue
+        with tempfile.TemporaryDirectory(prefix="wfbook-grade-") as folder:
+            (Path(folder) / "salt").write_text(str(salt))
+            try:
+                yield from _chapter(chapter, waiting, limits, at_once, Path(folder))
+            except ChapterError as error:
+                failures.append(str(error))
+                for student, answer, _ in waiting.values():
+                    yield _mark(student, chapter, answer.exercise, UNGRADED, str(error))
+    if failures:
+        raise ChapterError("; ".join(failures))
 
 
 def _chapter(
-    chapter: Chapter, waiting: Sequence[tuple[str, Answer, str]], limits: Limits, at_once: int, folder: Path
+    chapter: Chapter, waiting: dict[int, tuple[str, Answer, str]], limits: Limits, at_once: int, folder: Path
 ) -> Iterator[Mark | str]:
+    """Run one chapter's answers; what has its mark is waiting no longer."""
     jobs: dict[str, list[int]] = {}
-    for number, (_, answer, _) in enumerate(waiting):
+    for number, (_, answer, _) in waiting.items():
         (folder / f"job-{number}.json").write_text(json.dumps(answer.cells))
         jobs.setdefault(answer.exercise.name, []).append(number)
     steps = _steps(chapter, jobs)
@@ -161,7 +192,7 @@ def _chapter(
                 done += 1
                 yield f"{chapter.name}: {done} of {cells} cells of the chapter itself"
                 continue
-            student, answer, remark = waiting[message["job"]]
+            student, answer, remark = waiting.pop(message["job"])
             text = message["message"] + remark
             yield _mark(student, chapter, answer.exercise, message["verdict"], text)
 
@@ -213,8 +244,7 @@ def _messages(process: subprocess.Popen[str]) -> Iterator[dict[str, Any]]:
         yield json.loads(line)
     if process.wait() not in (0, 1):  # 1 comes with a message
         lines = process.stderr.read().splitlines()
-        why = lines[-1] if lines else f"code {process.returncode}"
-        raise ChapterError(f"a chapter's process ended: {why}")
+        yield {"failed": lines[-1] if lines else f"its process ended with code {process.returncode}"}
 
 
 def _mark(student: str, chapter: Chapter, exercise: Exercise, verdict: str, message: str) -> Mark:
