@@ -177,5 +177,6 @@ def _size(folder: Path) -> int:
 
 
 if __name__ == "__main__":
+    fence.die_with_parent()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     sys.exit(main(sys.argv[1]))
