@@ -114,22 +114,23 @@ Collect what students hand in as one folder or file a student, and grade it:
 
     python -m wfbook grade submissions --out marks.csv
 
-`marks.csv` has a line for each student and exercise: marks, a verdict and the reason. An interrupt keeps what is
-graded by then. `--chapters 3 5` grades these of everybody, also of who hands in nothing.
+`marks.csv` has a line for each student and exercise: marks, a verdict and the reason. An interrupt keeps
+what is graded by then. `--chapters 3 5` grades these of everybody, also of who hands in nothing.
 
 ## What may be trusted
 
-Only cells with answers, and helpers that they mention, are taken from a notebook. They run where the chapter
-stands by then, one exercise at a time, in a process that may compute and nothing else: Linux's seccomp and
-Landlock refuse it other processes, signals, connections, and all files but Python's and wfbook's own. Checks come
-from the installed library and run in another process, which calls the answer's functions from afar, once with the
-inputs that students see and once with others. So an answer that loops, crashes, floods, forges or deletes costs its
-own marks only.
+Only cells with answers, and helpers that they mention, are taken from a notebook. They run where the
+chapter stands by then, one exercise at a time, in a process that may compute and nothing else: Linux's
+seccomp and Landlock refuse it other processes, signals, connections, and all files but Python's and
+wfbook's own. Checks come from the installed library and run in another process, which calls the answer's
+functions from afar, once with the inputs that students see and once with others. So an answer that loops,
+crashes, floods, forges or deletes costs its own marks only.
 
-Nothing here notices an answer that was copied before it was handed in, or one that calls what the library itself
-has for the purpose: it is open, and students may read it. It is no defence against flaws of Linux. On a very busy
-machine a slow answer may be out of time that would not be on another: raise `--time-limit`. Elsewhere than on
-Linux on x86-64 there is no fence; `--no-fence` then runs answers with your own rights.
+Nothing here notices an answer that was copied before it was handed in, or one that calls what the library
+itself has for the purpose: it is open, and students may read it. It is no defence against flaws of Linux.
+On a very busy machine a slow answer may be out of time that would not be on another: raise
+`--time-limit`. Elsewhere than on Linux on x86-64 there is no fence; `--no-fence` then runs answers with
+your own rights.
 """
 
 
