@@ -162,13 +162,28 @@ def test_a_check_sees_what_an_answer_does_to_its_arguments(tiny):
     tiny("ann", None, "def coefficients(x, y):\n    x += 1\n    return x")
     tiny("bob", None, "def coefficients(x, y):\n    return x + y")
     tiny("cem", None, "def coefficients(x, y):\n    raise NotImplementedError")
+    tiny("dan", None, "coefficients = lambda x, y: print(x, y)")
     found = graded("--chapters", "42")
+    assert found["dan", "42-solve"][0] == "right"
     assert found["ann", "42-solve"] == (
         "wrong",
         "f changed its argument number 1; return a new array instead",
     )
     assert found["bob", "42-solve"][0] == "right"
     assert found["cem", "42-solve"] == ("wrong", "f is still to be written")
+
+
+def test_an_answer_may_call_what_a_check_gives_it(tiny):
+    tiny.teach("check.solves(coefficients)", "check.number(coefficients(lambda x: 1 / x, 4.0), 'f')")
+    tiny("ann", None, "coefficients = lambda cost, x: cost(cost(x)) + cost(np.array([x]))[0]")
+    tiny("bob", None, "coefficients = lambda cost, x: cost(0)")
+    tiny("cem", None, "coefficients = lambda cost, x: cost")
+    tiny("dan", None, "def coefficients(cost, x):\n    while True: cost(x)")
+    found = graded("--time-limit", "2")
+    assert found["ann", "42-solve"] == ("right", "")
+    assert "RuntimeError: ZeroDivisionError: division by zero" in found["bob", "42-solve"][1]
+    assert found["cem", "42-solve"] == ("wrong", "f is <a function>, not an array of numbers")
+    assert found["dan", "42-solve"][0] in ("out of time", "crashed")
 
 
 def test_an_instructor_copy_runs_to_its_end(tiny):

@@ -3,7 +3,6 @@
 import ast
 import json
 import os
-import pickle
 import socket
 import sys
 import tempfile
@@ -70,10 +69,10 @@ def serve(
         for source, is_answer in cells:
             said = _run(source, namespace)
             error = said if is_answer and said else error
-        kept: list[Any] = []
         _reply(channel, {"error": error})
+        questions = Questions(channel, namespace)
         while True:
-            _reply(channel, _answer(pickle.loads(wire.receive(channel)), namespace, kept))
+            questions.answer(questions.next())
     except BaseException:
         os._exit(1)
 
@@ -98,27 +97,59 @@ def _plain(source: str) -> str:
     return source
 
 
-def _answer(question: tuple[Any, ...], namespace: dict[str, Any], kept: list[Any]) -> dict[str, Any]:
-    def keep(function: Any) -> int:
-        kept.append(function)
-        return len(kept) - 1
+class Questions:
+    """What the check asks: values by their names, and calls of functions, which may call back."""
 
-    kind, *rest = question
-    try:
-        if kind == "values":
-            values = {name: namespace[name] for name in rest[0] if name in namespace}
-            return {"values": {name: wire.encode(value, keep) for name, value in values.items()}}
-        number, arguments, named = rest
+    def __init__(self, channel: socket.socket, namespace: dict[str, Any]) -> None:
+        self._channel = channel
+        self._namespace = namespace
+        self._kept: list[Any] = []
+
+    def next(self) -> tuple[Any, ...]:
+        """Return the next question, or what a function of the check returned."""
+        return wire.loads(wire.receive(self._channel), self._theirs)
+
+    def answer(self, question: tuple[Any, ...]) -> None:
+        """Answer one."""
+        kind, *rest = question
+        try:
+            reply = self._values(*rest) if kind == "values" else self._call(*rest)
+        except BaseException as error:
+            reply = {"error": _told(error)}
+        _reply(self._channel, reply)
+
+    def _values(self, names: Sequence[str]) -> dict[str, Any]:
+        known = {name: self._namespace[name] for name in names if name in self._namespace}
+        return {"values": {name: wire.encode(value, self._keep) for name, value in known.items()}}
+
+    def _call(self, number: int, arguments: tuple[Any, ...], named: dict[str, Any]) -> dict[str, Any]:
         before = [np.array(a, copy=True) if isinstance(a, np.ndarray) else None for a in arguments]
-        value = kept[number](*arguments, **named)
+        value = self._kept[number](*arguments, **named)
         changed = {
-            str(i): wire.encode(a, keep)
+            str(i): wire.encode(a, self._keep)
             for i, (old, a) in enumerate(zip(before, arguments, strict=True))
             if old is not None and not (old.shape == a.shape and old.tobytes() == a.tobytes())
         }
-        return {"value": wire.encode(value, keep), "changed": changed}
-    except BaseException as error:
-        return {"error": _told(error)}
+        return {"value": wire.encode(value, self._keep), "changed": changed}
+
+    def _keep(self, function: Any) -> int:
+        self._kept.append(function)
+        return len(self._kept) - 1
+
+    def _theirs(self, number: int) -> Callable[..., Any]:
+        """Return what stands for a function of the check: it is called over there."""
+
+        def function(*arguments: Any) -> Any:
+            said = [wire.encode(argument, self._keep) for argument in arguments]
+            _reply(self._channel, {"callback": number, "arguments": said})
+            while (message := self.next())[0] not in ("returned", "raised"):
+                self.answer(message)
+            kind, value = message
+            if kind == "raised":
+                raise RuntimeError(value)
+            return value
+
+        return function
 
 
 def _told(error: BaseException) -> list[str]:
