@@ -1,4 +1,4 @@
-"""The command line: ``python -m wfbook run TERRAIN | table2 | study | paper | lab``."""
+"""The command line: ``python -m wfbook run TERRAIN | table2 | study | paper | equations | lab``."""
 
 import argparse
 import contextlib
@@ -29,6 +29,7 @@ from wfbook.arguments import (
     whole,
     wrong_input,
 )
+from wfbook.equations import command as equations
 from wfbook.paper import command as paper
 from wfbook.report import ProgressLine, plain, search_line, summary_table
 from wfbook.study import command as study
@@ -131,6 +132,7 @@ def _parser() -> argparse.ArgumentParser:
     table2.add_to(commands)
     study.add_to(commands)
     paper.add_to(commands)
+    equations.add_to(commands)
 
     lab = commands.add_parser("lab", help="open the notebooks in JupyterLab", allow_abbrev=False)
     lab.set_defaults(command=_lab)
