@@ -124,6 +124,7 @@ def test_derivatives_against_differences(system, start, controls):
 
 
 def test_one_iteration_solves_a_linear_quadratic_problem():
+    """Eqs 18 to 21 are exact there."""
     for seed in range(5):
         system, start = linear(seed), np.random.default_rng(seed).normal(size=4)
         first, second, third = itertools.islice(iterations(system, start, np.zeros((N, 2))), 3)
@@ -134,6 +135,7 @@ def test_one_iteration_solves_a_linear_quadratic_problem():
 
 
 def test_its_gains_are_riccatis():
+    """Eqs 18 to 21, for a linear system and a quadratic cost."""
     system = linear(3)
     P = system.P
     states, controls = np.zeros((N + 1, 4)), np.zeros((N, 2))
@@ -162,6 +164,7 @@ def test_crocoddyl_finds_the_same(system, start, controls, solver):
 
 
 def test_the_first_direction_is_crocoddyls():
+    """Eqs 20 and 21, as another program has them."""
     system, start, controls = CASES[0]
     states = rollout(system, start, controls)
     k, K, *_ = backward(system, states, controls)
@@ -175,6 +178,7 @@ def test_the_first_direction_is_crocoddyls():
 
 
 def test_another_optimiser_finds_nothing_better():
+    """Eq. 16, by an optimiser that knows no value function."""
     system, start, controls = CASES[1]
     ours = solve(system, start, controls)
 

@@ -1,4 +1,4 @@
-"""Chapter 11: whole-body motion as one optimal control problem, in Crocoddyl (Paper B, eqs 16 to 21).
+"""Chapter 11: whole-body motion as one optimal control problem, in Crocoddyl (Paper B, eqs 4, 16, 17, 21).
 
 The dynamics are eq. 4 with steering, wheels and gripper locked: 41 numbers of state and 14 torques. A wheel's
 contact is held where eq. 4 keeps one answer: of two diagonal wheels in all three directions, of the others in
@@ -46,7 +46,7 @@ _UP = np.tile([0.0, 0.0, 1.0], (4, 1))
 
 
 class OptimalControl:
-    """Eq. 16 over a horizon: dynamics, costs, solver, and the last solution to start the next from.
+    """Paper B, eqs 16 and 17, over a horizon: dynamics, costs, solver, and the last solution.
 
     Args:
         nodes: time steps, N of eq. 16.
@@ -118,7 +118,7 @@ class OptimalControl:
         self.hold(start)
 
     def _action(self, dt: float, scale: float, without: set[str]) -> crocoddyl.ActionModelAbstract:
-        """Return a node: eq. 4 with every contact it may have, and eq. 17, ``scale`` times."""
+        """Return a node of Paper B, eqs 4 and 17: every contact it may have, and the cost ``scale`` times."""
         contacts = crocoddyl.ContactModelMultiple(self.state, self.actuation.nu)
         total = crocoddyl.CostModelSum(self.state, self.actuation.nu)
         gains = np.array([0.0, _SETTLING if self.mode == "legged" else 0.0])
@@ -268,14 +268,14 @@ class OptimalControl:
         return bool(done)
 
     def feedback(self, node: int) -> np.ndarray:
-        """Return K ``(14, 40)`` of eq. 21 at a node: torque to add per deviation of the state.
+        """Return K ``(14, 40)`` of Paper B, eq. 21, at a node: torque to add per deviation of the state.
 
         Crocoddyl's own gain has the opposite sign.
         """
         return -np.array(self.solver.K[node])
 
     def follow(self, share: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return what is planned within the first time step, and the torques of eq. 21 near it.
+        """Return what is planned within the first time step, and the torques of Paper B, eq. 21, near it.
 
         Args:
             share: of the step that has passed, 0 to 1.
@@ -296,7 +296,7 @@ class OptimalControl:
         self.payload = mass
 
     def acceleration(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Return the acceleration ``(20,)`` of eq. 4."""
+        """Return the acceleration ``(20,)`` of Paper B, eq. 4."""
         dynamics, data = self.actions[0].differential, self.problem.runningDatas[0].differential
         dynamics.calc(data, x, u)
         return np.array(data.xout)
