@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.ticker import MaxNLocator
 
 from wfbook.modes import LEGS
 from wfbook.omni.bellman import Table
@@ -158,6 +159,7 @@ def draw_costs(axes: Axes, costs: Mapping[str, np.ndarray], shown: int | None = 
         first = next(iter(costs.values()))
         axes.plot(shown, first[shown], "o", color=PLANNED, markersize=9, gid="shown")
     axes.set_yscale("log")
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.set_xlabel("iteration")
     axes.set_ylabel("cost")
     if len(costs) > 1:

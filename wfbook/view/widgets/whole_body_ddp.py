@@ -149,7 +149,7 @@ class Iterations(Panel):
             text = f"Iterate {shown}: no step made the cost smaller, damping grows"
         else:
             text = f"Iterate {shown}: step {now.step:.3g}, damping {now.damping:.2g}"
-        text += f", cost {now.cost:.3f}; the least there is: {best:.3f}."
+        text += f", cost {now.cost:.3f}; the least on a grid: {best:.3f}."
         last = self.found[-1]
         if shown < len(self.found) - 1:
             return text
@@ -165,10 +165,11 @@ TERMS = ("hand", "hand_rotation", "com", "trunk", "posture", "effort", "contact"
 
 
 class Parts(Panel):
-    """The robot's problem with terms and contacts taken away or added: what it costs to solve, and what breaks.
+    """The robot's problem with terms and contacts taken away or added: what it costs, and what breaks.
 
-    The hand is to move to the left and up. The problem is solved from rest; then the robot is one node further
-    and a little disturbed, and solved again twice: cold, from a start that knows nothing, and warm.
+    The hand is to move to the left and up. The problem is solved from rest. Then the robot is one node
+    further and a little disturbed, and it is solved twice again: cold, from a start that knows nothing, and
+    warm.
 
     Attributes:
         terms: by name, whether the term is in the cost.
