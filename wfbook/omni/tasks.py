@@ -38,6 +38,11 @@ HAND_STEP = (0.0, 0.2, 0.1)
 """By how much the hand is to move, unless something else is said: to the left and up."""
 
 
+_DOWN = 0.85
+"""Share of a swing after which the wheel is asked to be down: a cost is followed with some delay."""
+
+_SWINGING = Weights(leg=1e5, posture=0.1)
+
 LIFT = 0.08
 """How much higher a wheel is asked to be that stands nowhere in the horizon."""
 
@@ -202,10 +207,10 @@ def lifting(
     index = LEGS.index(leg)
     counts = [round(time / dt) for time in (shift, swing, settle)]
     nodes, begin, end = sum(counts), counts[0], counts[0] + counts[1]
-    ocp = OptimalControl(nodes, dt, mode="legged", **{"weights": Weights(posture=0.1), **options})
+    ocp = OptimalControl(nodes, dt, mode="legged", **{"weights": _SWINGING, **options})
     stances, targets, base = [], [], rest(ocp)
     for node in range(nodes + 1):
-        share = np.clip((node - begin) / (end - begin), 0.0, 1.0)
+        share = np.clip((node - begin) / (_DOWN * (end - begin)), 0.0, 1.0)
         stances.append([not (begin <= node < end and i == index) for i in range(4)])
         feet = base.feet.copy()
         feet[index] += [forward * share**2 * (3.0 - 2.0 * share), 0.0, height * np.sin(np.pi * share) ** 2]
