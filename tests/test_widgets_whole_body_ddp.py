@@ -76,6 +76,8 @@ def test_the_parabola_touches_the_trajectory_and_at_the_end_the_value_function(s
         V, V_s, V_ss = parabolas(search.system, now.states, now.controls)
         angle, height = line(search.pictures["search"], "parabola", 1).get_data()
         off = np.radians(angle) - now.states[step, 0]
+        low, high = search.pictures["search"].axes[1].get_ylim()
+        assert low < V[step] < high
         expected = V[step] + V_s[step, 0] * off + 0.5 * V_ss[step, 0, 0] * off**2
         assert height == pytest.approx(expected)
         true = line(search.pictures["search"], "value", 1)

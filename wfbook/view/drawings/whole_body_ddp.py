@@ -134,7 +134,8 @@ def draw_parabola(
             gid="parabola",
         )
         axes.plot(np.degrees(state), height, "o", color=PLANNED, markersize=8, gid="state")
-    top = 1.25 * float(table.value[step].max()) + 0.5
+    highest = float(table.value[step].max())
+    top = 1.25 * (highest if parabola is None else max(highest, parabola[0])) + 0.5
     axes.set_ylim(-0.15 * top, top)
     axes.set_xlim(angle[0], angle[-1])
     axes.set_xticks(np.arange(-180, 181, 90))
