@@ -44,6 +44,11 @@ def _box(value: bool, name: str) -> ipywidgets.Checkbox:
     return ipywidgets.Checkbox(value=value, description=name, indent=False, layout=layout)
 
 
+def _newtons(force: float) -> str:
+    """Return a force without the sign of a zero."""
+    return f"{round(force)} N" if np.isfinite(force) else "–"
+
+
 class Iterations(Panel):
     """DDP on a pendulum in honey, iterate by iterate, over the true value function.
 
@@ -318,7 +323,7 @@ class Parts(Panel):
                     f"{cost:.3g}",
                     f"{1e3 * plan.hand_error:.0f} mm",
                     f"{plan.load.max():.2f} × limit",
-                    f"{plan.lightest:.0f} N",
+                    _newtons(plan.lightest),
                 )
             )
         self.results.value = table(columns, rows)
