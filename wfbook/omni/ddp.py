@@ -197,6 +197,29 @@ def backward(
     return np.array(feedforward[::-1]), np.array(feedback[::-1]), slope, curvature, largest
 
 
+def parabolas(
+    system: System, states: np.ndarray, controls: np.ndarray, damping: float = 0.0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return what :func:`backward` takes the value function for, near each state of a trajectory.
+
+    Returns:
+        ``V (N + 1,)``, what the trajectory itself still costs from there on, ``V_s (N + 1, n)`` and
+        ``V_ss (N + 1, n, n)``.
+
+    Raises:
+        numpy.linalg.LinAlgError: as :func:`backward`.
+    """
+    left = [system.final_cost(states[-1])]
+    gradient, hessian = ([found] for found in system.final_derivatives(states[-1]))
+    for s, u in zip(states[-2::-1], controls[::-1], strict=True):
+        Q = expansion(system, s, u, gradient[-1], hessian[-1])
+        V_s, V_ss = value(Q, *gains(Q, damping))
+        left.append(left[-1] + system.cost(s, u))
+        gradient.append(V_s)
+        hessian.append(V_ss)
+    return np.array(left[::-1]), np.array(gradient[::-1]), np.array(hessian[::-1])
+
+
 def forward(
     system: System,
     states: np.ndarray,
