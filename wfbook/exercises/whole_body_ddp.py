@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wfbook.exercises.answer import WrongAnswer, array, called, number
+from wfbook.exercises.answer import WrongAnswer, array, called, draws, number
 from wfbook.omni.ddp import Expansion, backward, gains, value
 from wfbook.omni.locked import nominal_state
 from wfbook.omni.systems import LinearQuadratic
@@ -57,7 +57,7 @@ def turns(
         solve: from ``Q_u (m,)``, ``Q_su (n, m)`` and ``Q_uu (m, m)`` to ``k (m,)`` and ``K (m, n)``.
         cases: how many parabolas are tried.
     """
-    random = np.random.default_rng(21)
+    random = draws(21)
     for _ in range(cases):
         n, m = (int(size) for size in random.integers(2, 6, 2))
         n += n == m
@@ -91,7 +91,7 @@ def backs(before: Callable[..., tuple[np.ndarray, np.ndarray]], cases: int = 20)
         before: from ``Q_s, Q_u, Q_ss, Q_su, Q_uu, k, K`` to ``V_s (n,)`` and ``V_ss (n, n)``.
         cases: how many parabolas are tried; every other one with damped gains.
     """
-    random = np.random.default_rng(22)
+    random = draws(22)
     for case in range(cases):
         n, m = 3, 2
         Q, damping = _parabola(random, n, m), 0.0 if case % 2 == 0 else 5.0
@@ -125,7 +125,7 @@ def searches(search: Callable[..., float], cases: int = 60) -> str:
             curvature to the step; 0 if none will do.
         cases: how many cost functions are tried.
     """
-    random = np.random.default_rng(23)
+    random = draws(23)
     for case in range(cases):
         slope, curvature = -random.uniform(0.5, 5.0), random.uniform(0.5, 5.0)
         cost, wild = random.uniform(1.0, 20.0), 10.0 ** random.uniform(-1.0, 2.5)

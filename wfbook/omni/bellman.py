@@ -40,7 +40,7 @@ class Table:
 
 
 def tabulate(system: System, grid: np.ndarray, controls: np.ndarray, steps: int) -> Table:
-    """Go backward from the end: at each step and state try all controls, keep the best (Paper B, eq. 19).
+    """Go backward, at each step and state try all controls, keep the best (Paper B, eqs 18 and 19).
 
     Args:
         system: of one state and one control, the same at every step.
