@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 from wfbook.omni import scenarios, simulate
-from wfbook.omni.merits import driving_of, hand_of, hand_rpy, slips
+from wfbook.omni.merits import driving_of, hand_of, hand_rpy, lifted, slips
 from wfbook.omni.robot import HAND_HEIGHT, HAND_RPY, NOMINAL_HEIGHT, STEERS_V, WHEEL_RADIUS
 from wfbook.omni.scenarios import SCENARIOS
 
@@ -171,7 +171,18 @@ def test_slip_is_along_the_axle_and_only_on_the_ground(mixed):
     lifted = pushed.copy()
     lifted[100:200, 0] = 0.0
     slid = slips(replace(quiet, p=still + aside, contact_force=lifted))[:, 0]
-    assert slid[105] > 0.01 and np.all(slid[120:200] == 0.0) and slid[-1] < 0.08
+    assert slid[95] > 0.01 and np.all(slid[100:200] == 0.0) and slid[-1] < 0.08
+
+
+def test_a_swing_is_a_wheel_in_the_air_for_longer_than_a_bump(mixed):
+    assert mixed.metrics["swings"] == 0 and not lifted(mixed).any()
+    force = np.full_like(mixed.p, 50.0)
+    force[20:25, 0] = force[100:160, 1] = force[-30:, 3] = 0.0
+    hopping = replace(mixed, contact_force=force)
+    expected = np.zeros((len(mixed.t), 4), bool)
+    expected[100:160, 1] = expected[-30:, 3] = True
+    np.testing.assert_array_equal(lifted(hopping), expected)
+    assert driving_of(hopping, 40.0)["swings"] == 2
 
 
 def test_a_robot_that_goes_nowhere_has_no_cost_of_transport(squatted):

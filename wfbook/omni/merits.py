@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 _TOUCH = 5.0
 """Force of a wheel that touches, N."""
 _AWAY = 10
-"""Samples without a touch after which a wheel has been lifted, and begins anew."""
+"""Samples without a touch that make a swing."""
 _STRIDE = 10
 """Samples between points of the way."""
 _STAYS = 0.2
@@ -30,9 +30,14 @@ _STAYS = 0.2
 
 def hand_rpy(run: "OmniRun") -> np.ndarray:
     """Return the hand's roll, pitch and yaw, ``(N, 3)``, as if its target had not turned since the start."""
-    first = pin.utils.rotate("z", -run.pose[0, 2]) @ run.hand_rotation_ref[0]
+    first = pin.rpy.rpyToMatrix(hand_rpy_ref(run))
     pairs = zip(run.hand_rotation_ref, run.hand_rotation, strict=True)
     return np.unwrap([pin.rpy.matrixToRpy(first @ wanted.T @ turned) for wanted, turned in pairs], axis=0)
+
+
+def hand_rpy_ref(run: "OmniRun") -> np.ndarray:
+    """Return the roll, pitch and yaw, ``(3,)``, that the hand should have had at the start."""
+    return pin.rpy.matrixToRpy(pin.utils.rotate("z", -run.pose[0, 2]) @ run.hand_rotation_ref[0])
 
 
 def hand_of(run: "OmniRun") -> dict[str, Any]:
@@ -46,7 +51,6 @@ def hand_of(run: "OmniRun") -> dict[str, Any]:
     height, error, rpy = run.hand[:, 2], run.hand - run.hand_ref, hand_rpy(run)
     pairs = zip(run.hand_rotation_ref, run.hand_rotation, strict=True)
     turns = [np.linalg.norm(pin.log3(wanted.T @ turned)) for wanted, turned in pairs]
-    asked = pin.rpy.matrixToRpy(pin.utils.rotate("z", -run.pose[0, 2]) @ run.hand_rotation_ref[0])
     return {
         "hand_height_mean_m": float(height.mean()),
         "hand_height_std_m": float(height.std()),
@@ -55,7 +59,7 @@ def hand_of(run: "OmniRun") -> dict[str, Any]:
         "hand_turn_max_rad": float(max(turns)),
         "hand_rpy_mean_rad": rpy.mean(axis=0).tolist(),
         "hand_rpy_std_rad": rpy.std(axis=0).tolist(),
-        "hand_rpy_max_error_rad": np.abs(rpy - asked).max(axis=0).tolist(),
+        "hand_rpy_max_error_rad": np.abs(rpy - hand_rpy_ref(run)).max(axis=0).tolist(),
     }
 
 
@@ -63,7 +67,8 @@ def driving_of(run: "OmniRun", mass: float) -> dict[str, Any]:
     """Return how the robot drove, and at what cost.
 
     ``way_m`` is the length of the trunk's way seen from above, ``distance_m`` from its first point to its
-    last. ``base_rms_*`` are root mean squares of the trunk's distance from the commanded base, seen from
+    last, and ``planned_distance_m`` that of the commanded base; ``swings`` is how often a wheel was lifted.
+    ``base_rms_*`` are root mean squares of the trunk's distance from the commanded base, seen from
     above, and of the angle between them. ``slip_max_m`` is how far a wheel slid along its axle while it
     touched the ground. Cost of transport is the motors' work over ``m g way``, with all work counted
     (``cot_abs``) and only with what they put in (``cot_positive``); None if the robot goes nowhere.
@@ -82,6 +87,7 @@ def driving_of(run: "OmniRun", mass: float) -> dict[str, Any]:
     off = np.linalg.norm(place - run.pose[:, :2], axis=1)
     duration, distance = float(run.t[-1]), float(np.linalg.norm(place[-1] - place[0]))
     return {
+        "planned_distance_m": float(np.linalg.norm(run.pose[-1, :2] - run.pose[0, :2])),
         "distance_m": distance,
         "way_m": way,
         "duration_s": duration,
@@ -90,6 +96,7 @@ def driving_of(run: "OmniRun", mass: float) -> dict[str, Any]:
         "cot_positive": costs[1],
         "base_rms_m": float(np.sqrt(np.mean(off**2))),
         "base_rms_rad": float(np.sqrt(np.mean(_tilts(run) ** 2))),
+        "swings": int(np.sum(np.diff(lifted(run).astype(int), axis=0) > 0)),
         "slip_max_m": float(np.abs(slips(run)).max()),
     }
 
@@ -107,12 +114,25 @@ def slips(run: "OmniRun") -> np.ndarray:
         axle[:] = robot.axles
     steps = np.diff(run.p, axis=0, prepend=run.p[:1])
     sideways = (steps * axles).sum(axis=2)
-    touches = np.linalg.norm(run.contact_force, axis=2) > _TOUCH
-    slid, away = np.zeros(sideways.shape), np.zeros(len(LEGS), int)
+    touches, up = _touches(run), lifted(run)
+    slid = np.zeros(sideways.shape)
     for k in range(1, len(slid)):
-        away = ~touches[k] * (away + 1)
-        slid[k] = (away < _AWAY) * (slid[k - 1] + touches[k] * sideways[k])
+        slid[k] = ~up[k] * (slid[k - 1] + touches[k] * sideways[k])
     return slid
+
+
+def lifted(run: "OmniRun") -> np.ndarray:
+    """Return which wheels are in the air, ``(N, 4)`` bool; less than a tenth of a second does not count."""
+    touches, up = _touches(run), np.zeros((len(run.t), len(LEGS)), bool)
+    for wheel, touching in enumerate(touches.T):
+        edges = np.flatnonzero(np.diff(touching, prepend=True, append=True))
+        for begin, end in edges.reshape(-1, 2):
+            up[begin:end, wheel] = end - begin >= _AWAY
+    return up
+
+
+def _touches(run: "OmniRun") -> np.ndarray:
+    return np.linalg.norm(run.contact_force, axis=2) > _TOUCH
 
 
 def _tilts(run: "OmniRun") -> np.ndarray:
