@@ -43,7 +43,7 @@ CONTROLLERS = ("ddp", "ik-level", "ik-true")
 """The paper's; and inverse kinematics of the arm that takes the trunk to be level, or knows its true pose."""
 
 FORMAT = 2
-TIMINGS = ("tick_ms_median", "tick_ms_p95", "tick_ms_p99", "plan_ms_median", "plan_ms_p95")
+TIMINGS = ("tick_ms_median", "tick_ms_p95", "tick_ms_p99", "plan_ms_p5", "plan_ms_median", "plan_ms_p95")
 TIMINGS += ("real_time_factor",)
 """Metrics that differ from run to run of one seed; they are not in the run file."""
 
@@ -385,6 +385,7 @@ class _Loop:
             "tick_ms_median": float(np.median(ticks)),
             "tick_ms_p95": float(np.percentile(ticks, 95)),
             "tick_ms_p99": float(np.percentile(ticks, 99)),
+            "plan_ms_p5": float(np.percentile(plans, 5)),
             "plan_ms_median": float(np.median(plans)),
             "plan_ms_p95": float(np.percentile(plans, 95)),
             "real_time_factor": float(len(self.times) * FEEDBACK / elapsed),
