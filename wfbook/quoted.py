@@ -133,7 +133,7 @@ PAPER_B = (
     Quoted("omni.feedback", _TIMES, "rate of the linear feedback", 500.0, "Hz"),
     Quoted(
         *("omni.orin", _TIMES, "computed on an Nvidia Jetson Orin NX"),
-        unused="times of ours are those of the machine named above",
+        unused="ours are times of the machine named above",
     ),
     # Results: the robot.
     Quoted("omni.leg_joints", _PLATFORM, "leg joints", 8, "joints"),
