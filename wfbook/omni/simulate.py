@@ -8,7 +8,7 @@ is at rest.
 import os
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self
 
@@ -21,15 +21,30 @@ from wfbook.omni.controller import FEEDBACK, ArmAlone, Command, OnWheels, WholeB
 from wfbook.omni.costs import Weights
 from wfbook.omni.driving import Driving, holding_torques
 from wfbook.omni.locked import MOTORS, Target, nominal_target
-from wfbook.omni.robot import DAMPING, NOMINAL_HEIGHT, NU, NV, STIFFNESS, Omni, contact_offsets, posture
+from wfbook.omni.merits import driving_of, hand_of
+from wfbook.omni.robot import (
+    DAMPING,
+    NOMINAL_HEIGHT,
+    NU,
+    NV,
+    STIFFNESS,
+    WHEELS_V,
+    Omni,
+    contact_offsets,
+    posture,
+)
 from wfbook.omni.waves import LENGTH, PEAK, RUN_UP, Ground, waves
 from wfbook.terrain import Terrain
+
+Targets = Callable[[float, np.ndarray], Target]
+"""From the time and the commanded base's pose ``(3,)`` to what the robot is asked for."""
 
 CONTROLLERS = ("ddp", "ik-level", "ik-true")
 """The paper's; and inverse kinematics of the arm that takes the trunk to be level, or knows its true pose."""
 
-FORMAT = 1
-TIMINGS = ("tick_ms_median", "tick_ms_p95", "plan_ms_median", "plan_ms_p95", "real_time_factor")
+FORMAT = 2
+TIMINGS = ("tick_ms_median", "tick_ms_p95", "tick_ms_p99", "plan_ms_p5", "plan_ms_median", "plan_ms_p95")
+TIMINGS += ("real_time_factor",)
 """Metrics that differ from run to run of one seed; they are not in the run file."""
 
 _SETTLE = 0.5
@@ -77,8 +92,10 @@ class OmniRun(Driving):
 
     Attributes:
         tau: ``(N, 23)`` torques that acted.
+        angles: ``(N, 23)`` joint angles that the motors were told to hold; those of wheels mean nothing.
         hand_rotation: ``(N, 3, 3)``.
         hand_ref: ``(N, 3)`` where the hand was to be.
+        hand_rotation_ref: ``(N, 3, 3)`` how it was to be turned.
         events: what went wrong: time and text.
         metrics: figures of merit, see :func:`metrics_of`.
         meta: how it was run.
@@ -86,12 +103,14 @@ class OmniRun(Driving):
 
     LOGGED: ClassVar[tuple[str, ...]] = (
         *("t", "qpos", "qvel", "com", "hand", "p", "contact_force", "pose", "twist", "steering"),
-        *("tau", "hand_rotation", "hand_ref"),
+        *("tau", "angles", "hand_rotation", "hand_ref", "hand_rotation_ref"),
     )
 
     tau: np.ndarray
+    angles: np.ndarray
     hand_rotation: np.ndarray
     hand_ref: np.ndarray
+    hand_rotation_ref: np.ndarray
     events: list[tuple[float, str]] = field(default_factory=list)
     metrics: dict[str, Any] = field(default_factory=dict)
     meta: dict[str, Any] = field(default_factory=dict)
@@ -158,8 +177,10 @@ def run(
     payload: float = 0.0,
     trunk_mass_scale: float = 1.0,
     push: tuple[Sequence[float], float, float] | None = None,
-    target: Target | None = None,
+    target: Target | Targets | None = None,
     weights: Weights | None = None,
+    wheel_disturbance: Callable[[float], np.ndarray] | None = None,
+    progress: Callable[[float, float], None] | None = None,
 ) -> OmniRun:
     """Simulate a run.
 
@@ -174,8 +195,12 @@ def run(
         payload: mass in the hand that the controller does not know of, kg.
         trunk_mass_scale: of the trunk's true mass; the controller believes in 1.
         push: force ``(3,)`` at the trunk, when it begins, how long it lasts.
-        target: of hand and body; by default Paper B's.
+        target: of hand and body, or a function of the time and the commanded base's pose; by default
+            Paper B's.
         weights: of eq. 17.
+        wheel_disturbance: from time to what is added to the wheels' commanded rates ``(4,)``; no controller
+            knows of it.
+        progress: called ten times a simulated second with the time and the end of the course.
 
     Raises:
         ValueError: an unknown controller, or no course.
@@ -187,11 +212,12 @@ def run(
     began = time.perf_counter()
     target = nominal_target() if target is None else target
     robot = Omni(terrain, trunk_mass_scale, payload)
+    base, ground = Base(), Ground(terrain)
+    base.state[0] = start
+    targets, target = (target, target(0.0, base.state[:3])) if callable(target) else (None, target)
     qpos = posture()
     qpos[0], qpos[2], qpos[7 + MOTORS] = start, target.height, target.posture
     robot.reset(qpos)
-    base, ground = Base(), Ground(terrain)
-    base.state[0] = start
     known = delay, noise, np.random.default_rng(seed)
     driver: OnWheels
     if controller == "ddp":
@@ -199,6 +225,7 @@ def run(
     else:
         driver = ArmAlone(ground, target, base, delay, level=controller == "ik-level")
     loop = _Loop(robot, driver, known, push)
+    loop.targets, loop.wheel_disturbance, loop.progress = targets, wheel_disturbance, progress
     loop.drive(course)
     columns = {name: np.array([sample[name] for sample in loop.samples]) for name in loop.samples[0]}
     meta = {
@@ -209,11 +236,12 @@ def run(
         "payload": payload,
         "payload_estimate": driver.ocp.payload if isinstance(driver, WholeBody) else None,
         "trunk_mass_scale": trunk_mass_scale,
+        "mass": float(robot.model.body_subtreemass[0]),
         "course": [[float(duration), [float(v) for v in twist]] for duration, twist in course],
     }
     result = OmniRun(**columns, terrain=terrain, events=loop.events, meta=meta)
     elapsed = time.perf_counter() - began
-    result.metrics.update(metrics_of(result, target) | loop.timings(elapsed))
+    result.metrics.update(metrics_of(result) | loop.timings(elapsed))
     return result
 
 
@@ -228,6 +256,9 @@ class _Loop:
         push: tuple[Sequence[float], float, float] | None,
     ) -> None:
         self.robot, self.driver, self.push = robot, driver, push
+        self.targets: Targets | None = None
+        self.wheel_disturbance: Callable[[float], np.ndarray] | None = None
+        self.progress: Callable[[float, float], None] | None = None
         self.delay, self.noise, self.rng = known
         self.past = deque(maxlen=1 + round(1000 * self.delay))
         self.samples: list[dict[str, Any]] = []
@@ -250,6 +281,8 @@ class _Loop:
             moving = bool(self.events) and np.abs(data.qvel[:6]).max() > _STILL
             if t >= stop + (_LONGEST_REST if moving else _REST):
                 return
+            if self.progress is not None and step % 100 == 0:
+                self.progress(t, float(ends[-1]) + _REST)
             leg = int(np.searchsorted(ends, t, side="right")) if t >= 0.0 else len(twists)
             self._step(step, twists[leg] if leg < len(twists) else np.zeros(3))
             step += 1
@@ -262,6 +295,8 @@ class _Loop:
             qpos, qvel = self.past[0]
             if self.noise is not None:
                 qpos, qvel = self.noise.disturb(qpos, qvel, self.rng)
+            if self.targets is not None:
+                self.driver.target = self.targets(t, self.driver.wheels.base.state[:3])
             began = time.perf_counter()
             self.command = self.driver.tick(qpos, qvel, wanted)
             self.times.append(time.perf_counter() - began)
@@ -273,8 +308,11 @@ class _Loop:
             force, begin, duration = self.push
             robot.push(np.asarray(force, float) * (begin <= t < begin + duration))
         command, data = self.command, robot.data
+        rates = command.rates.copy()
+        if self.wheel_disturbance is not None and not self.events:
+            rates[WHEELS_V - 6] += self.wheel_disturbance(t)
         self.tau = command.torques + command.stiffness * (command.angles - data.qpos[7:])
-        self.tau = self.tau + command.damping * (command.rates - data.qvel[6:])
+        self.tau = self.tau + command.damping * (rates - data.qvel[6:])
         robot.step(self.tau)
         if step >= 0 and step % 10 == 0:
             self.samples.append(self._sample(t))
@@ -320,6 +358,7 @@ class _Loop:
         robot, data, base = self.robot, self.robot.data, self.driver.wheels.base
         normals = self.driver.ground.below(robot.centres)[1]
         hand, rotation = robot.hand
+        yaw = pin.utils.rotate("z", base.state[2])
         return {
             "t": t,
             "qpos": data.qpos.copy(),
@@ -332,8 +371,10 @@ class _Loop:
             "twist": base.twist,
             "steering": self.driver.wheels.steering.copy(),
             "tau": np.clip(self.tau, -robot.efforts, robot.efforts),
+            "angles": self.command.angles.copy(),
             "hand_rotation": rotation,
             "hand_ref": self._hand_ref(),
+            "hand_rotation_ref": yaw @ self.driver.target.hand_rotation,
         }
 
     def timings(self, elapsed: float) -> dict[str, float]:
@@ -343,35 +384,27 @@ class _Loop:
         return {
             "tick_ms_median": float(np.median(ticks)),
             "tick_ms_p95": float(np.percentile(ticks, 95)),
+            "tick_ms_p99": float(np.percentile(ticks, 99)),
+            "plan_ms_p5": float(np.percentile(plans, 5)),
             "plan_ms_median": float(np.median(plans)),
             "plan_ms_p95": float(np.percentile(plans, 95)),
             "real_time_factor": float(len(self.times) * FEEDBACK / elapsed),
         }
 
 
-def metrics_of(run: OmniRun, target: Target) -> dict[str, Any]:
-    """Return a run's figures of merit.
+def metrics_of(run: OmniRun) -> dict[str, Any]:
+    """Return a run's figures of merit: those of :mod:`.merits`, and how the run went.
 
-    ``hand_height_*`` are of the hand above the level ground at the start, in metres; ``hand_turn_max_rad``
-    is the largest angle between the hand and how it should be turned, the base's yaw aside;
-    ``rest_speed_m_s`` the fastest that the trunk moved in the last tenth of a second.
+    ``finished`` is a run in which nothing went wrong; ``rest_speed_m_s`` the fastest that the trunk moved in
+    the last tenth of a second.
     """
-    height = run.hand[:, 2]
-    yaws = run.pose[:, 2]
-    turns = [
-        np.linalg.norm(pin.log3((pin.utils.rotate("z", yaw) @ target.hand_rotation).T @ rotation))
-        for yaw, rotation in zip(yaws, run.hand_rotation, strict=True)
-    ]
-    error = run.hand - run.hand_ref
-    return {
-        "hand_height_mean_m": float(height.mean()),
-        "hand_height_std_m": float(height.std()),
-        "hand_height_max_error_m": float(np.abs(error[:, 2]).max()),
-        "hand_level_max_error_m": float(np.linalg.norm(error[:, :2], axis=1).max()),
-        "hand_turn_max_rad": float(max(turns)),
-        "distance_m": float(np.linalg.norm(run.qpos[-1, :2] - run.qpos[0, :2])),
-        "upright": not any("fallen" in what for _, what in run.events),
-        "finished": not run.events,
-        "rest_speed_m_s": float(np.abs(run.qvel[-10:, :3]).max()),
-        "events": [f"{when:.2f} s: {what}" for when, what in run.events],
-    }
+    return (
+        hand_of(run)
+        | driving_of(run, run.meta["mass"])
+        | {
+            "upright": not any("fallen" in what for _, what in run.events),
+            "finished": not run.events,
+            "rest_speed_m_s": float(np.abs(run.qvel[-10:, :3]).max()),
+            "events": [f"{when:.2f} s: {what}" for when, what in run.events],
+        }
+    )

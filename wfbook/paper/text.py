@@ -69,13 +69,14 @@ def number(value: float) -> str:
 
 def _markdown(report: dict[str, Any]) -> Iterator[str]:
     options, machine = report["options"], report["machine"]
-    yield "# The paper's results beside ours"
+    yield "# The papers' results beside ours"
     yield ""
     yield (
         f"Done on {machine['usable_cores']} of {machine['cores']} cores, {machine['processor']}. Searches "
         f"end at a gap of {100 * options['gap']:g} % or after {options['time_limit']:g} s. Each plan is "
         f"simulated with {len(options['seeds'])} seeds; the controller sees the {options['state']} state, "
-        f"and torques act after {options['delay_ms']:g} ms. Ours is the median over the seeds."
+        f"and torques act after {options['delay_ms']:g} ms. Of paper B's robot that is the age of what is "
+        "measured, with noise if its state is estimated. Ours is the median over the seeds."
     )
     if not report["complete"]:
         yield "\n**Incomplete**: interrupted before the rest was done; the same command goes on from here."
