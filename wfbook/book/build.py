@@ -1,0 +1,95 @@
+"""From chapters to a folder of web pages."""
+
+import io
+import os
+import shutil
+from collections.abc import Callable, Collection
+from pathlib import Path
+
+from sphinx.application import Sphinx
+from sphinx.errors import SphinxError
+from sphinx.util.docutils import docutils_namespace, patch_docutils
+
+from wfbook.book import front, reference
+from wfbook.book.chapters import Chapter, page_of
+from wfbook.book.execute import execute
+from wfbook.view.meshcat_static import viewer_script
+
+HERE = Path(__file__).resolve().parent
+KATEX = HERE.parent.parent / "assets" / "katex"
+
+
+class BuildError(Exception):
+    """Sphinx found something wrong in the book's sources; the text has a line for each."""
+
+
+def build(
+    chosen: list[Chapter],
+    parts: Collection[str],
+    paper: Path,
+    out: Path,
+    scratch: Path,
+    cores: int,
+    kept: Path | None,
+    show: Callable[[str], None],
+) -> None:
+    """Build the book.
+
+    Args:
+        chosen: the chapters.
+        parts: of ``front.PARTS``, what else is wanted.
+        paper: folder with the comparison that ``python -m wfbook paper`` wrote.
+        out: empty folder for the pages.
+        scratch: empty folder for everything else.
+        cores: processes at a time.
+        kept: folder of executed chapters, or None.
+        show: is told how far it is.
+
+    Raises:
+        BuildError: there is something wrong with the sources.
+        ChapterError: a cell failed.
+        OSError: something can't be read or written.
+        ValueError: a notebook is none, or shows what a page can't.
+    """
+    sources, extra = scratch / "sources", scratch / "extra"
+    (sources / "chapters").mkdir(parents=True)
+    replays = extra / "replays"
+    executed = execute([chapter.path for chapter in chosen], cores, kept, show)
+    show("writing the pages")
+    for chapter in chosen:
+        page = page_of(chapter, executed[chapter.path], replays, "../replays")
+        front.write_notebook(sources / f"{chapter.page}.ipynb", page)
+    front.write(sources, replays, chosen, parts, paper)
+    if "api" in parts:
+        (sources / "api").mkdir()
+        reference.write(sources / "api")
+    (replays / "viewer.js").write_text(viewer_script(), encoding="utf-8")
+    static = scratch / "static"
+    shutil.copytree(HERE / "static", static)
+    shutil.copytree(KATEX, static / "katex")
+    run_sphinx(sources, out, scratch / "doctrees", {
+        "html_static_path": [str(static)],
+        "html_extra_path": [str(extra)],
+    }, cores)  # fmt: skip
+
+
+def run_sphinx(
+    sources: Path, out: Path, doctrees: Path, settings: dict[str, object], cores: int
+) -> None:
+    """Run Sphinx with the book's settings, in which every warning is an error.
+
+    Raises:
+        BuildError: with all warnings.
+    """
+    warnings = io.StringIO()
+    with patch_docutils(str(HERE)), docutils_namespace():
+        try:
+            app = Sphinx(
+                srcdir=sources, confdir=HERE, outdir=out, doctreedir=doctrees, buildername="html",
+                confoverrides=settings, status=None, warning=warnings, freshenv=True, parallel=cores,
+            )  # fmt: skip
+            app.build(force_all=True)
+        except SphinxError as error:
+            warnings.write(str(error))
+    if text := warnings.getvalue().replace(f"{sources}{os.sep}", "").strip():
+        raise BuildError(text)
