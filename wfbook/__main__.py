@@ -1,4 +1,4 @@
-"""The command line: ``python -m wfbook run TERRAIN | table2 | study | paper | lab``."""
+"""The command line: ``python -m wfbook run TERRAIN | table2 | study | paper | book | lab``."""
 
 import argparse
 import contextlib
@@ -29,6 +29,7 @@ from wfbook.arguments import (
     whole,
     wrong_input,
 )
+from wfbook.book import command as book
 from wfbook.paper import command as paper
 from wfbook.report import ProgressLine, plain, search_line, summary_table
 from wfbook.study import command as study
@@ -131,6 +132,7 @@ def _parser() -> argparse.ArgumentParser:
     table2.add_to(commands)
     study.add_to(commands)
     paper.add_to(commands)
+    book.add_to(commands)
 
     lab = commands.add_parser("lab", help="open the notebooks in JupyterLab", allow_abbrev=False)
     lab.set_defaults(command=_lab)

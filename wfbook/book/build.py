@@ -3,9 +3,10 @@
 import io
 import os
 import shutil
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 
+import nbformat
 from sphinx.application import Sphinx
 from sphinx.errors import SphinxError
 from sphinx.util.docutils import docutils_namespace, patch_docutils
@@ -24,7 +25,7 @@ class BuildError(Exception):
 
 
 def build(
-    chosen: list[Chapter],
+    chosen: Sequence[Chapter],
     parts: Collection[str],
     paper: Path,
     out: Path,
@@ -37,7 +38,7 @@ def build(
 
     Args:
         chosen: the chapters.
-        parts: of ``front.PARTS``, what else is wanted.
+        parts: of :data:`wfbook.book.command.PARTS`, what else is wanted.
         paper: folder with the comparison that ``python -m wfbook paper`` wrote.
         out: empty folder for the pages.
         scratch: empty folder for everything else.
@@ -54,11 +55,12 @@ def build(
     sources, extra = scratch / "sources", scratch / "extra"
     (sources / "chapters").mkdir(parents=True)
     replays = extra / "replays"
+    replays.mkdir(parents=True)
     executed = execute([chapter.path for chapter in chosen], cores, kept, show)
     show("writing the pages")
     for chapter in chosen:
         page = page_of(chapter, executed[chapter.path], replays, "../replays")
-        front.write_notebook(sources / f"{chapter.page}.ipynb", page)
+        nbformat.write(page, sources / f"{chapter.page}.ipynb")
     front.write(sources, replays, chosen, parts, paper)
     if "api" in parts:
         (sources / "api").mkdir()
@@ -73,9 +75,7 @@ def build(
     }, cores)  # fmt: skip
 
 
-def run_sphinx(
-    sources: Path, out: Path, doctrees: Path, settings: dict[str, object], cores: int
-) -> None:
+def run_sphinx(sources: Path, out: Path, doctrees: Path, settings: dict[str, object], cores: int) -> None:
     """Run Sphinx with the book's settings, in which every warning is an error.
 
     Raises:

@@ -91,7 +91,6 @@ def page_of(
         still(notebook)
     except ValueError as error:
         raise ValueError(f"{chapter.path.name}: {error}") from None
-    replays.mkdir(parents=True, exist_ok=True)
     count = 0
 
     def moved(match: re.Match) -> str:

@@ -125,9 +125,7 @@ async def _all(
             group.create_task(one(path, notebook))
 
 
-async def _one(
-    path: Path, notebook: nbformat.NotebookNode, folder: Path, at: Callable[[int], None]
-) -> None:
+async def _one(path: Path, notebook: nbformat.NotebookNode, folder: Path, at: Callable[[int], None]) -> None:
     client = NotebookClient(
         notebook, timeout=PATIENCE, kernel_name="python3", resources={"metadata": {"path": str(folder)}}
     )

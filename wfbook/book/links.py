@@ -5,9 +5,12 @@ names of the library in code, ``wfbook.swing.quintic_basis``. Without a paper an
 that the page is about: A in part I and B in part II. What there is no page for stays text.
 """
 
+import ast
 import importlib
 import re
 from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 from docutils import nodes
@@ -95,7 +98,10 @@ def _replace(text: nodes.Text, places: list[tuple[int, int, str]]) -> None:
         return
     whole, parts, after = text.astext(), [], 0
     for begin, end, address in places:
-        parts += [nodes.Text(whole[after:begin]), nodes.reference("", whole[begin:end], refuri=address, internal=True)]
+        parts += [
+            nodes.Text(whole[after:begin]),
+            nodes.reference("", whole[begin:end], refuri=address, internal=True),
+        ]
         after = end
     parent = text.parent
     parent.replace(text, [*(part for part in parts if part.astext()), nodes.Text(whole[after:])])
@@ -118,6 +124,26 @@ def _definition(name: str) -> str:
     return f"{getattr(thing, '__module__', path)}.{getattr(thing, '__qualname__', last)}"
 
 
+def _say_which(app: Sphinx, document: nodes.document) -> None:
+    """Give the names in signatures the module that they are imported from: several modules have a ``Run``."""
+    for node in document.findall(pending_xref):
+        module, name = node.get("py:module"), node.get("reftarget", "")
+        if node.get("refdomain") == "py" and module and "." not in name:
+            node["reftarget"] = _imported(module).get(name, name)
+
+
+@cache
+def _imported(module: str) -> dict[str, str]:
+    """Return what a module takes from the library, also what only its type hints need: full name by name."""
+    tree = ast.parse(Path(importlib.import_module(module).__file__).read_text(encoding="utf-8"))
+    return {
+        alias.asname or alias.name: _definition(f"{node.module}.{alias.name}")
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("wfbook")
+        for alias in node.names
+    }
+
+
 def _elsewhere(
     app: Sphinx, environment: BuildEnvironment, node: pending_xref, content: nodes.Element
 ) -> nodes.reference | None:
@@ -132,6 +158,7 @@ def _elsewhere(
 
 def setup(app: Sphinx) -> dict[str, Any]:
     """Register the extension (Sphinx's interface)."""
+    app.connect("doctree-read", _say_which)
     app.connect("doctree-resolved", _link)
     app.connect("missing-reference", _elsewhere)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,6 +1,6 @@
-"""Sphinx extension: mathematics by KaTeX, from a file, and equations that carry the papers' numbers.
+r"""Sphinx extension: mathematics by KaTeX, from a file, and equations that carry the papers' numbers.
 
-``\\tag{A 8}`` in a displayed equation is equation 8 of paper A. It becomes an anchor, ``eq-a-8``, that text
+``\tag{A 8}`` in a displayed equation is equation 8 of paper A. It becomes an anchor, ``eq-a-8``, that text
 on any page can link to (:mod:`.links`).
 """
 
@@ -80,7 +80,9 @@ def _displayed(self: Any, node: nodes.math_block) -> None:
     self.body.append(f'<div class="math notranslate nohighlight" data-display>{self.encode(tex)}</div>')
     for number in node.get("numbers", ()):
         paper, n = number
-        self.body.append(f'<a class="eqno" href="#{anchor(number)}" title="Paper {paper}, eq. {n}">({paper} {n})</a>')
+        self.body.append(
+            f'<a class="eqno" href="#{anchor(number)}" title="Paper {paper}, eq. {n}">({paper} {n})</a>'
+        )
     self.body.append("</div>\n")
     raise nodes.SkipNode
 

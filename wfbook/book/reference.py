@@ -38,7 +38,9 @@ def modules(name: str) -> list[str]:
     if (ROOT / f"{name}.py").exists():
         return [f"wfbook.{name}"]
     found = []
-    for path in sorted((ROOT / name).rglob("*.py"), key=lambda path: (path.parent, path.name != "__init__.py")):
+    for path in sorted(
+        (ROOT / name).rglob("*.py"), key=lambda path: (path.parent, path.name != "__init__.py")
+    ):
         parts = path.relative_to(ROOT.parent).with_suffix("").parts
         found.append(".".join(parts[:-1] if parts[-1] == "__init__" else parts))
     return [module for module in found if module != "wfbook.book.conf"]
@@ -53,13 +55,13 @@ def write(folder: Path) -> None:
     names = [name for _, group in GROUPS for package in group for name in modules(package)]
     for name in names:
         (folder / f"{name}.rst").write_text("\n".join(_page(name)) + "\n", encoding="utf-8")
-    (folder / "index.rst").write_text("\n".join(_index(names)) + "\n", encoding="utf-8")
+    (folder / "index.rst").write_text("\n".join(_index()) + "\n", encoding="utf-8")
 
 
-def _index(names: list[str]) -> Iterator[str]:
+def _index() -> Iterator[str]:
     yield from _heading("Library reference", "=")
-    yield "The library reads in the order of the chapters, and so does this list: a module uses only what stands"
-    yield "above it. ``import wfbook`` is quick; a module loads what it needs when it is first used."
+    yield "The library reads in the order of the chapters, and so does this list: a module uses only what"
+    yield "stands above it. ``import wfbook`` is quick; a module loads what it needs when it is first used."
     yield ""
     for title, packages in GROUPS:
         yield from _heading(title, "-")
@@ -72,15 +74,15 @@ def _index(names: list[str]) -> Iterator[str]:
                 yield f"   * - :mod:`{name}`"
                 yield f"     - {_first_line(name)}"
         yield ""
-    yield ".. toctree::"
-    yield "   :hidden:"
-    yield ""
-    for name in names:
-        yield f"   {name.removeprefix('wfbook.')} <{name}>"
 
 
 def _page(name: str) -> Iterator[str]:
+    # Two hundred entries more in the navigation of every page would hide the chapters.
+    yield ":orphan:"
+    yield ""
     yield from _heading(name, "=")
+    yield ":doc:`Library reference <index>`"
+    yield ""
     yield f".. automodule:: {name}"
     passed_on = _passed_on(name)
     if _path(name).name == "__init__.py":

@@ -111,18 +111,17 @@ def _dropdown(state: Mapping[str, Any], looks: str) -> str:
 
 
 def _buttons(state: Mapping[str, Any], looks: str) -> str:
-    parts = [
-        f'<span class="wfbook-choice{" mod-active" if i == state["index"] else ""}">{html.escape(text)}</span>'
-        for i, text in enumerate(state["_options_labels"])
-    ]
+    parts = []
+    for index, text in enumerate(state["_options_labels"]):
+        chosen = " mod-active" if index == state["index"] else ""
+        parts.append(f'<span class="wfbook-choice{chosen}">{html.escape(text)}</span>')
     return _control(looks, state["description"], *parts)
 
 
 def _checkbox(state: Mapping[str, Any], looks: str) -> str:
-    mark = "checked" if state["value"] else ""
+    mark, text = "checked" if state["value"] else "", html.escape(state["description"])
     return (
-        f'<div {looks}><input type="checkbox" disabled {mark} aria-label="{html.escape(state["description"])}">'
-        f"<span>{html.escape(state['description'])}</span></div>"
+        f'<div {looks}><input type="checkbox" disabled {mark} aria-label="{text}"><span>{text}</span></div>'
     )
 
 

@@ -31,6 +31,7 @@ _PLANNING = (
 _TELLING = (
     "__main__.py",
     "arguments.py",
+    "book",
     "quoted.py",
     "report.py",
     "results.py",
