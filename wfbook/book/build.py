@@ -2,6 +2,7 @@
 
 import io
 import os
+import re
 import shutil
 from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
@@ -18,6 +19,10 @@ from wfbook.view.meshcat_static import viewer_script
 
 HERE = Path(__file__).resolve().parent
 KATEX = HERE.parent.parent / "assets" / "katex"
+
+_UNUSED = ("locales", "images", "scripts/*.map", "styles/*.map")
+"""What the theme brings under ``_static`` and no page asks for: translations, logos, maps to sources."""
+_COLOURS = re.compile(r"\x1b\[[\d;]*m")
 
 
 class BuildError(Exception):
@@ -52,6 +57,7 @@ def build(
         OSError: something can't be read or written.
         ValueError: a notebook is none, or shows what a page can't.
     """
+    out, scratch = out.resolve(), scratch.resolve()  # Sphinx would look beside its settings
     sources, extra = scratch / "sources", scratch / "extra"
     (sources / "chapters").mkdir(parents=True)
     replays = extra / "replays"
@@ -91,5 +97,8 @@ def run_sphinx(sources: Path, out: Path, doctrees: Path, settings: dict[str, obj
             app.build(force_all=True)
         except SphinxError as error:
             warnings.write(str(error))
-    if text := warnings.getvalue().replace(f"{sources}{os.sep}", "").strip():
+    for name in _UNUSED:
+        for path in out.glob(f"_static/{name}"):
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+    if text := _COLOURS.sub("", warnings.getvalue()).replace(f"{sources}{os.sep}", "").strip():
         raise BuildError(text)

@@ -64,9 +64,9 @@ class Chapter:
         return dict(_ROW.findall(self.opening))
 
 
-def chapters(folder: Path = FOLDER) -> list[Chapter]:
+def chapters() -> list[Chapter]:
     """Return all chapters in reading order."""
-    return [Chapter(path) for path in sorted(folder.glob("[0-9][0-9]_*.ipynb"))]
+    return [Chapter(path) for path in sorted(FOLDER.glob("[0-9][0-9]_*.ipynb"))]
 
 
 def page_of(

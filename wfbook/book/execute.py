@@ -9,7 +9,7 @@ import contextlib
 import hashlib
 import os
 import tempfile
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import AsyncIterator, Callable, Coroutine, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -129,17 +129,37 @@ async def _one(path: Path, notebook: nbformat.NotebookNode, folder: Path, at: Ca
     client = NotebookClient(
         notebook, timeout=PATIENCE, kernel_name="python3", resources={"metadata": {"path": str(folder)}}
     )
-    client.create_kernel_manager()
-    client.km.connection_file = str(folder / "kernel.json")
-    client.km.transport, client.km.ip = "ipc", str(folder / "k")  # opens no port
-    async with client.async_setup_kernel(env=_environment(folder)):
+    async with _kernel(client, folder):
         for index, cell in enumerate(notebook.cells):
             at(index)
             try:
                 await client.async_execute_cell(cell, index)
             except (CellExecutionError, CellTimeoutError, DeadKernelError) as error:
+                if asyncio.current_task().cancelling():  # which nbclient takes for a kernel's death
+                    raise asyncio.CancelledError from None
                 raise ChapterError(f"{path.name}, cell {index}: {_what(error)}") from None
         client.set_widgets_metadata()
+
+
+@contextlib.asynccontextmanager
+async def _kernel(client: NotebookClient, folder: Path) -> AsyncIterator[None]:
+    """Start a kernel, and end it however this ends.
+
+    nbclient's own context takes SIGINT and SIGTERM away from whoever waits for them.
+    """
+    manager = client.create_kernel_manager()
+    manager.connection_file = str(folder / "kernel.json")
+    manager.transport, manager.ip = "ipc", str(folder / "k")  # opens no port
+    try:
+        await client.async_start_new_kernel(env=_environment(folder))
+        await client.async_start_new_kernel_client()
+        yield
+    finally:
+        if client.kc is not None:
+            client.kc.stop_channels()
+        if manager.has_kernel:
+            await manager.shutdown_kernel(now=True)
+        manager.cleanup_resources()
 
 
 def _what(error: Exception) -> str:

@@ -2,13 +2,14 @@
 
 Authors write what they would write on paper: "eq. 8", "eqs 12 to 15", "Paper B, eq. 7", "chapter 3", and
 names of the library in code, ``wfbook.swing.quintic_basis``. Without a paper an equation is one of the paper
-that the page is about: A in part I and B in part II. What there is no page for stays text.
+that the paragraph named last, or that the page is about: A in part I and B in part II. What there is no page
+for stays text.
 """
 
 import ast
 import importlib
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -18,15 +19,15 @@ from sphinx.addnodes import desc_signature, pending_xref
 from sphinx.application import Sphinx
 from sphinx.environment import BuildEnvironment
 
-from wfbook.book.mathematics import anchor, equations
+from wfbook.book.mathematics import MAP, Number, anchor, equations
 
 SECOND_PART = 9
 """The first chapter on paper B."""
 
-_MORE = r"(?:(?:, | and |, and | or | to |–|-)\d+)*"
+_MORE = r"(?:(?:, and | and |, | or | to |–)\d+)*"
 _EQUATIONS = re.compile(
-    rf"(?:Paper (?P<paper>[AB])(?:,|'s) )?\b[Ee]q(?:s\.? |uations )(?P<several>\d+{_MORE})"
-    r"|(?:Paper (?P<its>[AB])(?:,|'s) )?\b[Ee]q(?:\.|uation) (?P<one>\d+)"
+    r"(?:\bPaper (?P<paper>[AB]), (?:after )?)?"
+    rf"\b(?:[Ee]q\. (?P<one>\d+)|[Ee]quation (?P<spelt>\d+)|(?:[Ee]qs|[Ee]quations) (?P<many>\d+{_MORE}))"
 )
 _CHAPTERS = re.compile(rf"\b[Cc]hapters? (?P<numbers>\d+{_MORE})")
 _NUMBER = re.compile(r"\d+")
@@ -42,32 +43,31 @@ def _link(app: Sphinx, document: nodes.document, page: str) -> None:
     known = equations(app.env)
     chapters = {int(m[1]): name for name in app.env.found_docs if (m := re.search(r"/(\d\d)_", name))}
     home = "B" if _about_b(page) else "A"
+    named: dict[int, str] = {}  # by block of text, the paper that was named last in it
 
-    def places(text: str) -> Iterator[tuple[int, int, str]]:
+    def place_of(number: Number) -> str | None:
+        """Return where an equation stands: here, in the chapter that explains it, or in the map of all."""
+        pages = known.get(number, ())
+        if page in pages:
+            return f"#{anchor(number)}"
+        target = pages[0] if pages else MAP if MAP in app.env.found_docs and page != MAP else None
+        return target and f"{app.builder.get_relative_uri(page, target)}#{anchor(number)}"
+
+    def places(text: str, block: int) -> Iterator[tuple[int, int, str]]:
         """Yield where links begin and end, and what they lead to."""
         for match in _EQUATIONS.finditer(text):
-            paper = match["paper"] or match["its"] or home
-            group = "several" if match["several"] else "one"
-            numbers = list(_NUMBER.finditer(match[group]))
-            for at in numbers:
-                pages = known.get((paper, at[0]), ())
-                if pages:
-                    target = page if page in pages else pages[0]
-                    begin = match.start() if len(numbers) == 1 else match.start(group) + at.start()
-                    address = "" if target == page else app.builder.get_relative_uri(page, target)
-                    yield begin, match.start(group) + at.end(), f"{address}#{anchor((paper, at[0]))}"
+            named[block] = paper = match["paper"] or named.get(block, home)
+            yield from _links(match, ("one", "spelt", "many"), lambda n, p=paper: place_of((p, n)))
         for match in _CHAPTERS.finditer(text):
-            numbers = list(_NUMBER.finditer(match["numbers"]))
-            for at in numbers:
-                target = chapters.get(int(at[0]))
-                if target not in (None, page):
-                    begin = match.start() if len(numbers) == 1 else match.start("numbers") + at.start()
-                    address = app.builder.get_relative_uri(page, target)
-                    yield begin, match.start("numbers") + at.end(), address
+            yield from _links(match, ("numbers",), chapter_of)
+
+    def chapter_of(number: str) -> str | None:
+        target = chapters.get(int(number))
+        return None if target in (None, page) else app.builder.get_relative_uri(page, target)
 
     for text in list(document.findall(nodes.Text)):
         if not _within(text, _UNTOUCHED):
-            _replace(text, sorted(places(text.astext())))
+            _replace(text, sorted(places(text.astext(), _block(text))))
     for code in list(document.findall(nodes.literal)):
         match = _NAME.match(code.astext())
         if match and not isinstance(code.parent, nodes.reference) and (found := _entry(app.env, match[0])):
@@ -76,6 +76,25 @@ def _link(app: Sphinx, document: nodes.document, page: str) -> None:
             link["refuri"] = f"{app.builder.get_relative_uri(page, target)}#{name}"
             code.replace_self(link)
             link += code
+
+
+def _links(
+    match: re.Match, groups: tuple[str, ...], place: Callable[[str], str | None]
+) -> Iterator[tuple[int, int, str]]:
+    """Yield begin, end and address of what a match names; a single thing is linked with its words."""
+    group = next(group for group in groups if match[group])
+    numbers = list(_NUMBER.finditer(match[group]))
+    for at in numbers:
+        if (address := place(at[0])) is not None:
+            begin = match.start() if len(numbers) == 1 else match.start(group) + at.start()
+            yield begin, match.start(group) + at.end(), address
+
+
+def _block(node: nodes.Node) -> int:
+    """Return what identifies the paragraph, or the like, that a text is in."""
+    while isinstance(node.parent, nodes.Inline):
+        node = node.parent
+    return id(node.parent)
 
 
 def _about_b(page: str) -> bool:

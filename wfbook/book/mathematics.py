@@ -17,6 +17,9 @@ TAG = re.compile(r"\\tag\{([AB]) (\d+[a-z]?)\}")
 Number = tuple[str, str]
 """Of an equation: the paper, "A" or "B", and the number in it."""
 
+MAP = "equations"
+"""The page with all equations of both papers; it may be missing."""
+
 _log = logging.getLogger(__name__)
 
 
@@ -78,11 +81,12 @@ def _displayed(self: Any, node: nodes.math_block) -> None:
     tex = node.get("tex", node.astext())
     self.body.append(self.starttag(node, "div", CLASS="equation"))
     self.body.append(f'<div class="math notranslate nohighlight" data-display>{self.encode(tex)}</div>')
-    for number in node.get("numbers", ()):
-        paper, n = number
-        self.body.append(
-            f'<a class="eqno" href="#{anchor(number)}" title="Paper {paper}, eq. {n}">({paper} {n})</a>'
-        )
+    builder, place = self.builder, ""
+    if MAP in builder.env.found_docs:  # what the number leads to: functions, chapters and tests
+        place = builder.get_relative_uri(builder.current_docname, MAP)
+    for paper, number in node.get("numbers", ()):
+        address, name = f"{place}#{anchor((paper, number))}", f"Paper {paper}, eq. {number}"
+        self.body.append(f'<a class="eqno" href="{address}" title="{name}">({paper} {number})</a>')
     self.body.append("</div>\n")
     raise nodes.SkipNode
 

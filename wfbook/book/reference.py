@@ -24,9 +24,20 @@ GROUPS: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("Pictures, replays and widgets", ("view",)),
     ("Checks of the exercises", ("exercises",)),
     ("The papers' numbers", ("quoted", "paper", "table2", "study")),
-    ("The command line", ("report", "results", "arguments", "book")),
 )
 """Headings of the reference, and the modules and packages under them."""
+
+_REST = "The command line, and what serves it"
+_UNSEEN = {"wfbook.__init__", "wfbook.__main__", "wfbook.book.conf"}
+
+
+def groups() -> list[tuple[str, list[str]]]:
+    """Return headings and the modules under each; those that no chapter claims come last."""
+    found = [(title, [name for package in names for name in modules(package)]) for title, names in GROUPS]
+    claimed = {name for _, names in found for name in names} | _UNSEEN
+    tops = sorted({path.relative_to(ROOT).with_suffix("").parts[0] for path in ROOT.rglob("*.py")})
+    rest = [name for top in tops for name in modules(top) if name not in claimed]
+    return [*found, (_REST, rest)]
 
 
 def modules(name: str) -> list[str]:
@@ -43,7 +54,7 @@ def modules(name: str) -> list[str]:
     ):
         parts = path.relative_to(ROOT.parent).with_suffix("").parts
         found.append(".".join(parts[:-1] if parts[-1] == "__init__" else parts))
-    return [module for module in found if module != "wfbook.book.conf"]
+    return [module for module in found if module not in _UNSEEN]
 
 
 def write(folder: Path) -> None:
@@ -52,8 +63,7 @@ def write(folder: Path) -> None:
     Args:
         folder: where; it must exist.
     """
-    names = [name for _, group in GROUPS for package in group for name in modules(package)]
-    for name in names:
+    for name in (name for _, names in groups() for name in names):
         (folder / f"{name}.rst").write_text("\n".join(_page(name)) + "\n", encoding="utf-8")
     (folder / "index.rst").write_text("\n".join(_index()) + "\n", encoding="utf-8")
 
@@ -63,16 +73,15 @@ def _index() -> Iterator[str]:
     yield "The library reads in the order of the chapters, and so does this list: a module uses only what"
     yield "stands above it. ``import wfbook`` is quick; a module loads what it needs when it is first used."
     yield ""
-    for title, packages in GROUPS:
+    for title, names in groups():
         yield from _heading(title, "-")
         yield ".. list-table::"
         yield "   :widths: 35 65"
         yield "   :class: wfbook-modules"
         yield ""
-        for package in packages:
-            for name in modules(package):
-                yield f"   * - :mod:`{name}`"
-                yield f"     - {_first_line(name)}"
+        for name in names:
+            yield f"   * - :mod:`{name}`"
+            yield f"     - {_first_line(name)}"
         yield ""
 
 
