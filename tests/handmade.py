@@ -194,7 +194,7 @@ def squares(x, p, lam):
 
 
 def cost(plan):
-    """Half the sum of all squares of eqs 31-33, vectorised where the checker loops."""
+    """Half the sum of all squares of eqs 31–33, vectorised where the checker loops."""
     K, J = len(plan["lam"]), plan["S"].shape[1]
     F = plan["lam"] / WEIGHT
     goal = plan["x"][-1, :2] - plan["meta"]["goal"]

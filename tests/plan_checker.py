@@ -120,7 +120,7 @@ def _matrices(p: Trajectory, ledger: Ledger) -> None:
 
 
 def _dynamics(p: Trajectory, ledger: Ledger) -> None:
-    """Newton's law (1) and midpoint integration of position and orientation."""
+    """Newton's law (eq. 1) and midpoint integration of position and orientation."""
     gravity = np.array([0.0, 0.0, -GRAVITY])
     for k in range(p.K):
         force = p.lam[k].sum(axis=0) + p.f[k].sum(axis=0)
@@ -172,7 +172,7 @@ def _angular(p: Trajectory, ledger: Ledger) -> None:
 
 
 def _swings(p: Trajectory, ledger: Ledger) -> None:
-    """Splines from lift-off to touch-down (2-6), and no force in the air (7)."""
+    """Splines from lift-off to touch-down (eqs 2–6), and no force in the air (eq. 7)."""
     duration = p.rho * p.dt
     for leg in range(4):
         for j in np.flatnonzero(p.S[leg]):
@@ -192,7 +192,7 @@ def _swings(p: Trajectory, ledger: Ledger) -> None:
 
 
 def _polynomial(duration: float, start: tuple, end: tuple, middle: tuple = ()) -> np.polynomial.Polynomial:
-    """The polynomial in time with these values and derivatives at start, end and half time (eqs 2-5)."""
+    """The polynomial in time with these values and derivatives at start, end and half time (eqs 2–5)."""
     rows, values = [], []
     n = len(start) + len(end) + len(middle)
     for time, conditions in ((0.0, start), (duration, end), (duration / 2, middle)):
@@ -205,7 +205,7 @@ def _polynomial(duration: float, start: tuple, end: tuple, middle: tuple = ()) -
 
 
 def _stances(p: Trajectory, ledger: Ledger) -> None:
-    """Feet stand (19), wheels roll with the body (20, 21), contacts lie on regions (22, 23).
+    """Feet stand (eq. 19), wheels roll with the body (eqs 20, 21), contacts lie on regions (eqs 22, 23).
 
     A wheel lands on the region that D names, or stands there at the start; then it may be on any region
     of the group, at every knot.
@@ -236,7 +236,7 @@ def _on_one_of(
 
 
 def _forces(p: Trajectory, ledger: Ledger) -> None:
-    """Friction pyramids (26, 27), rolling friction (28, 29), which opposes rolling, and the largest force.
+    """Friction pyramids (eqs 26, 27), rolling friction (eqs 28, 29), against the way, and the largest force.
 
     All three in the basis of one region that the contact is on when the interval begins or ends: a wheel
     may have left the region of D.
@@ -267,7 +267,7 @@ def _forces(p: Trajectory, ledger: Ledger) -> None:
 
 
 def _bodies(p: Trajectory, ledger: Ledger) -> None:
-    """Centroid of the contacts (10-15) and reach (30), which is about each leg's own hip."""
+    """Centroid of the contacts (eqs 10–15) and reach (eq. 30), which is about each leg's own hip."""
     lower, upper = np.array(p.meta["reach_lower"]), np.array(p.meta["reach_upper"])
     for k in range(p.K):
         standing = [leg for leg in range(4) if not p.swings(leg, k)]
@@ -333,7 +333,7 @@ def _limits(p: Trajectory, ledger: Ledger) -> None:
 
 
 def objective(plan: Any) -> float:
-    """Work out the cost of a plan (eqs 31-33) with the weights in its meta.
+    """Work out the cost of a plan (eqs 31–33) with the weights in its meta.
 
     Forces and bounds are in body weights. The height that is rewarded is that of the robot's nominal stance
     above the ground under its legs.
@@ -377,7 +377,7 @@ def _ground(p: Trajectory) -> list[float]:
 
 
 def _values(p: Trajectory, ledger: Ledger) -> None:
-    """Objective (31-33), bound and gap. A polished plan carries those of the relaxed plan it came from."""
+    """Objective (eqs 31–33), bound and gap; a polished plan carries those of the relaxed plan before."""
     value, bound, gap = (p.meta[name] for name in ("objective", "bound", "gap"))
     scale = max(abs(value), 1e-9)
     if p.meta["stage"] == "relaxed":

@@ -318,7 +318,7 @@ def test_words_become_links(tmp_path):
     pages = paged(
         tmp_path,
         **{
-            "00_over": "$$a \\tag{A 1}$$\n\nSee eq. 1, eq. 2 and chapters 1 and 9; not eq. 99 nor chapter 7.",
+            "00_over": "$$a \\tag{A 1}$$\n\nSee eq. 1, eq. 2 and chapters 1 and 9; not eq. 5 nor chapter 7.",
             "01_body": "$$a \\tag{A 1}$$\n\n$$b \\tag{A 2}$$\n\nEqs 1 to 2. `eq. 1` is code.",
             "09_wheels": "$$c \\tag{B 1}$$\n\n**Eq. 1** is B's. Paper A, eq. 2 is not; nor eq. 1.\n\nEq. 1",
         },

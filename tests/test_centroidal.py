@@ -28,6 +28,7 @@ def test_standing_still_takes_the_robot_s_weight():
 
 
 def test_a_push_accelerates_by_force_over_mass():
+    """Eq. 1, by plain algebra."""
     lam, f = ([RNG.normal(size=(5, 4)) for _ in range(3)] for _ in range(2))
     a = [(lam[i] + f[i]).sum(axis=1) / 2.5 + (0.0, 0.0, -GRAVITY)[i] for i in range(3)]
     np.testing.assert_allclose(linear_dynamics(a, lam, f, 2.5), 0.0, atol=1e-12)
@@ -43,6 +44,7 @@ def test_the_midpoint_rule_is_exact_for_constant_acceleration():
 
 
 def test_torque_is_lever_cross_force():
+    """Eq. 8 is NumPy's cross product."""
     lever, lam = RNG.normal(size=(2, 3, 6, 4))
     expected = np.cross(np.moveaxis(lever, 0, -1), np.moveaxis(lam, 0, -1))
     np.testing.assert_allclose(np.stack(contact_torque(lever, lam), axis=-1), expected, atol=1e-12)
@@ -50,6 +52,7 @@ def test_torque_is_lever_cross_force():
 
 @pytest.mark.parametrize("scale", [0.1, 1.0, 11.0])
 def test_the_bounds_differ_by_four_times_the_torque(scale):
+    """Eq. 9, at any scale."""
     lever, lam = RNG.normal(size=(2, 3, 6, 4))
     plus, minus = ([sum(z**2 for z in pair) for pair in side] for side in bound_terms(lever, lam, scale))
     for torque, up, down in zip(contact_torque(lever, lam), plus, minus, strict=True):

@@ -38,6 +38,7 @@ def test_a_foot_stays_and_a_wheel_goes_with_the_body(ride):
 
 
 def test_a_swing_is_the_spline_of_chapter_2(ride):
+    """Eq. 6."""
     path = leg_path(ride, *rows(ride, "010010", "f0 w1 w1 w1 f2 f2"))
     assert path.broken == []
     step = 1e-5
@@ -145,6 +146,7 @@ class PapersProgram:
 
 
 def test_the_papers_program_has_a_path_where_this_one_breaks_nothing():
+    """Eqs 18 to 25, against the big-M program's own rows."""
     ride = Ride(bank_and_deck(), slots=3, start=0.05, speed=0.43)
     paper, rng = PapersProgram(ride), np.random.default_rng(4)
     every = list(legal_rows(ride.slots, ride.start_dynamics))

@@ -35,6 +35,7 @@ def allowed_by_the_planner(problem: Problem, program, S: np.ndarray, D: np.ndarr
 
 @pytest.mark.parametrize("start", ["foot", "wheel"])
 def test_the_papers_program_allows_the_same_rows(start):
+    """Eqs 16 and 17 as the big-M program states them."""
     problem = Problem(
         flat(),
         goal=(0.1, 0.0),
@@ -108,6 +109,7 @@ def test_stored_plans_are_written_by_these_functions(name):
 
 
 def test_a_wheel_may_roll_through_its_group_and_a_foot_may_not():
+    """Eqs 22 and 23."""
     D = np.zeros((1, 2, 3, 2), int)
     D[0, 0, 1, 0] = D[0, 1, 1, 1] = 1
     allowed = regions_allowed(D, [[0], [1, 2]])
@@ -116,6 +118,7 @@ def test_a_wheel_may_roll_through_its_group_and_a_foot_may_not():
 
 
 def test_the_count_of_swings_satisfies_13_and_14():
+    """Eqs 13 and 14, for every set of swinging legs."""
     S = np.array(list(product((0, 1), repeat=4))).T
     s = swing_count(S)
     assert (s.sum(axis=0) == 1).all() and (np.arange(5) @ s == S.sum(axis=0)).all()
@@ -123,6 +126,7 @@ def test_the_count_of_swings_satisfies_13_and_14():
 
 
 def test_the_centroid_moves_with_its_contacts_and_not_with_the_others():
+    """Eqs 10 to 12 and 15, as a mean."""
     rng = np.random.default_rng(1)
     p, S = rng.normal(size=(6, 4, 3)), np.array([[1, 0], [0, 0], [0, 1], [1, 0]])
     c = contact_centroid(p, S)

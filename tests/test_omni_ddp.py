@@ -8,6 +8,7 @@ import pytest
 from scipy.linalg import solve_discrete_are
 from scipy.optimize import minimize
 
+from wfbook.omni.bellman import tabulate
 from wfbook.omni.ddp import (
     Expansion,
     backward,
@@ -15,12 +16,13 @@ from wfbook.omni.ddp import (
     forward,
     gains,
     iterations,
+    parabolas,
     rollout,
     solve,
     total_cost,
     value,
 )
-from wfbook.omni.systems import LinearQuadratic, Pendulum, Unicycle
+from wfbook.omni.systems import Honey, LinearQuadratic, Pendulum, Unicycle
 
 N = 30
 
@@ -80,9 +82,11 @@ CASES = [
     (linear(), np.array([1.0, -1.0, 0.5, 2.0]), np.zeros((N, 2))),
 ]
 NAMES = ["pendulum", "unicycle", "linear"]
+# Crocoddyl never comes back from Honey: where Q_uu is not positive it raises its damping without end.
+BENT = (Honey(), np.array([0.5]), np.full((40, 1), 2.0))
 
 
-@pytest.mark.parametrize(("system", "start", "controls"), CASES, ids=NAMES)
+@pytest.mark.parametrize(("system", "start", "controls"), [*CASES, BENT], ids=[*NAMES, "honey"])
 def test_derivatives_against_differences(system, start, controls):
     random = np.random.default_rng(1)
     n, m, h = len(start), controls.shape[1], 1e-6
@@ -124,6 +128,7 @@ def test_derivatives_against_differences(system, start, controls):
 
 
 def test_one_iteration_solves_a_linear_quadratic_problem():
+    """Eqs 18 to 21 are exact there."""
     for seed in range(5):
         system, start = linear(seed), np.random.default_rng(seed).normal(size=4)
         first, second, third = itertools.islice(iterations(system, start, np.zeros((N, 2))), 3)
@@ -134,6 +139,7 @@ def test_one_iteration_solves_a_linear_quadratic_problem():
 
 
 def test_its_gains_are_riccatis():
+    """Eqs 18 to 21, for a linear system and a quadratic cost."""
     system = linear(3)
     P = system.P
     states, controls = np.zeros((N + 1, 4)), np.zeros((N, 2))
@@ -162,6 +168,7 @@ def test_crocoddyl_finds_the_same(system, start, controls, solver):
 
 
 def test_the_first_direction_is_crocoddyls():
+    """Eqs 20 and 21, as another program has them."""
     system, start, controls = CASES[0]
     states = rollout(system, start, controls)
     k, K, *_ = backward(system, states, controls)
@@ -175,6 +182,7 @@ def test_the_first_direction_is_crocoddyls():
 
 
 def test_another_optimiser_finds_nothing_better():
+    """Eq. 16, by an optimiser that knows no value function."""
     system, start, controls = CASES[1]
     ours = solve(system, start, controls)
 
@@ -276,3 +284,58 @@ def test_a_run_away_trajectory_is_refused():
     assert total_cost(system, *forward(system, states, controls, 0 * controls, np.zeros((60, 1, 2)))) == (
         pytest.approx(total_cost(system, states, controls))
     )
+
+
+def test_the_value_function_near_a_trajectory_is_the_cost_of_the_best_from_there():
+    system, start, _ = CASES[2]
+    best = solve(system, start, np.zeros((N, 2))).last
+    V, V_s, V_ss = parabolas(system, best.states, best.controls)
+    assert V[0] == pytest.approx(best.cost) and V[-1] == pytest.approx(system.final_cost(best.states[-1]))
+    random = np.random.default_rng(5)
+    for step in (0, 11, N - 1):
+        off = 0.3 * random.normal(size=4)
+        from_there = solve(system, best.states[step] + off, np.zeros((N - step, 2))).last.cost
+        assert from_there == pytest.approx(V[step] + V_s[step] @ off + 0.5 * off @ V_ss[step] @ off)
+
+
+HONEY, GRID = Honey(), np.linspace(-4.6, 4.6, 161)
+
+
+@pytest.fixture(scope="module")
+def table():
+    return tabulate(HONEY, GRID, np.linspace(-10.0, 10.0, 121), 40)
+
+
+def test_a_table_of_one_step_is_the_best_of_all_controls():
+    controls = np.linspace(-3.0, 3.0, 7)
+    one = tabulate(HONEY, np.linspace(-1.0, 1.0, 4001), controls, 1)
+    s = np.array([0.4])
+    tried = [HONEY.cost(s, np.array([u])) + HONEY.final_cost(HONEY.step(s, np.array([u]))) for u in controls]
+    assert one.at(0, 0.4) == pytest.approx(min(tried), abs=1e-5)
+    assert one.best[0, np.abs(one.grid - 0.4).argmin()] == controls[np.argmin(tried)]
+    with pytest.raises(ValueError, match="does not ascend"):
+        tabulate(HONEY, np.array([0.0, 0.0, 1.0]), controls, 1)
+
+
+def test_ddp_finds_what_the_table_has(table):
+    for degrees in (30.0, 90.0, -120.0):
+        start = np.radians([degrees])
+        found = solve(HONEY, start, np.full((40, 1), np.sign(degrees) * 2.0))
+        assert found.last.cost == pytest.approx(table.at(0, start[0]), rel=0.01, abs=0.03)
+        assert found.last.states[:, 0] == pytest.approx(table.follow(HONEY, start[0]), abs=0.06)
+
+
+def test_the_table_is_symmetric_with_a_ridge_that_ddp_does_not_see(table):
+    np.testing.assert_allclose(table.value, table.value[:, ::-1], atol=1e-9)
+    left, right = table.at(0, -0.05), table.at(0, 0.05)
+    assert table.at(0, 0.0) > left == pytest.approx(right)
+    still = solve(HONEY, np.zeros(1), np.zeros((40, 1)))
+    assert still.converged and still.last.cost > 4.0 * table.at(0, 0.0), "stationary is not the least"
+    wrong = solve(HONEY, np.radians([-30.0]), np.full((40, 1), 3.0))
+    assert wrong.last.states[-1] == pytest.approx([np.pi], abs=0.05)
+    assert wrong.last.cost > 1.2 * table.at(0, np.radians(-30.0))
+
+
+def test_the_table_after_some_steps_is_that_of_a_shorter_horizon(table):
+    short = tabulate(HONEY, GRID, np.linspace(-10.0, 10.0, 121), 10)
+    np.testing.assert_allclose(short.value, table.value[-11:])

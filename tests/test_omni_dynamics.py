@@ -60,6 +60,7 @@ def test_wheels_that_roll_do_not_slip(dynamics):
 
 
 def test_the_drift_is_the_change_of_the_jacobian(dynamics):
+    """Eq. 3, by finite differences."""
     random = np.random.default_rng(0)
     model, h = Omni(flat()).model, 1e-6
     for _ in range(3):
@@ -130,6 +131,7 @@ def test_the_answer_obeys_both_rows_of_eq_4(dynamics):
 
 
 def test_in_the_air_it_falls(dynamics):
+    """Eq. 5."""
     answer = forward_dynamics(dynamics, posture(), np.zeros(NV), np.zeros(NU), {})
     assert answer.force.shape == (0,)
     assert answer.acceleration[:6] == pytest.approx([0, 0, -9.81, 0, 0, 0], abs=1e-9)

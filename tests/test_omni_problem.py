@@ -91,6 +91,7 @@ def test_derivatives_of_standing_and_swinging(stance):
 
 @pytest.mark.parametrize("term", [*TERMS, "contact"])
 def test_every_term_alone_has_its_derivatives(term):
+    """Eq. 17, term by term."""
     rng = np.random.default_rng(2)
     ocp = standing(1, without={*TERMS, "contact"} - {term})
     x = disturbed(ocp, rng, 0.4)
@@ -190,6 +191,7 @@ def test_the_pyramid_is_that_of_chapter_10():
 
 
 def test_the_penalty_sees_each_force_in_its_contacts_axes():
+    """Eqs 8 and 9 in Crocoddyl."""
     rng = np.random.default_rng(3)
     ocp = standing(1)
     x = disturbed(ocp, rng, 0.2)
@@ -230,6 +232,7 @@ def test_the_hand_gets_where_it_is_asked_to():
 
 
 def test_a_solution_keeps_to_the_dynamics():
+    """Eq. 16."""
     ocp = standing(20)
     x = disturbed(ocp, np.random.default_rng(0), 0.01)
     ocp.place_contacts(x)
@@ -241,6 +244,7 @@ def test_a_solution_keeps_to_the_dynamics():
 
 
 def test_feedback_is_how_the_torque_changes_with_the_state():
+    """Eq. 21."""
     ocp = standing(10)
     x = nominal_state()
     ocp.solve(x)

@@ -101,6 +101,7 @@ def test_where_the_static_area_ends_nothing_balances():
 
 
 def test_balance_balances_within_the_cones():
+    """Eqs 10 and 11."""
     contacts = [*wheels(), wall()]
     outside = gravity_wrench(np.array([0.2, 0.05, 0.5]), np.array([0.1, -0.05, 0.0]), 300.0)
     wrenches = balance(contacts, outside)

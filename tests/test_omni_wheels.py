@@ -56,6 +56,7 @@ def unit(angles: np.ndarray) -> np.ndarray:
 
 
 def test_1_every_wheel_gets_the_velocity_of_its_place():
+    """Eqs 12 to 15 together."""
     for twist, positions, steering, backward in cases():
         for memory in (None, backward):
             command = wheel_command(twist, positions, steering, memory)
@@ -74,6 +75,7 @@ def test_2_the_twist_comes_back_from_the_wheels():
 
 
 def test_3_no_wheel_turns_by_more_than_a_quarter():
+    """Eq. 14."""
     for twist, positions, steering, backward in cases(1000):
         free = wheel_command(twist, positions, steering)
         assert np.abs(free.steering - steering).max() <= np.pi / 2 + 1e-12
@@ -151,6 +153,7 @@ def test_8_ranks():
 
 
 def test_9_nothing_skids():
+    """Eq. 22: the sideways rows are zero."""
     for twist, positions, steering, backward in cases():
         command = wheel_command(twist, positions, steering, backward)
         sideways = constraint_matrix(command.steering, positions)[: len(positions)] @ twist
@@ -218,6 +221,7 @@ def test_printed_literally_eq_14_turns_wheels_too_far():
 
 
 def test_directions_and_wrapping():
+    """Eq. 13."""
     np.testing.assert_allclose(
         steering_directions(np.array([[1.0, 0.0], [0.0, 2.0], [-1.0, 0.0]])), [0.0, np.pi / 2, np.pi]
     )

@@ -66,6 +66,7 @@ def test_a_wrench_of_real_forces_satisfies_every_row(cone, points):
     [(line_contact(MU, WIDTH), line_ends(WIDTH)), (surface_contact(MU, LENGTH, WIDTH), CORNERS)],
 )
 def test_a_wrench_has_real_forces_exactly_if_it_satisfies_the_rows(cone, points):
+    """Eqs 6 and 7, mended, are what forces at points can do: a linear program agrees."""
     random = np.random.default_rng(1)
     counts = {True: 0, False: 0}
     for _ in range(300):
@@ -146,6 +147,7 @@ def test_eq_7_as_printed_admits_too_much_friction_and_no_moment():
 
 
 def test_the_penalty_is_zero_inside_and_its_derivatives_are_right():
+    """Eqs 8 and 9."""
     random = np.random.default_rng(5)
     cone = line_contact(MU, WIDTH)
     inner = wrench_of(line_ends(WIDTH), forces_in_pyramids(random, 2, 50))

@@ -34,6 +34,7 @@ def file_of(plan, tmp_path):
 
 @pytest.mark.parametrize("stage", [0, 1], ids=["relaxed", "polished"])
 def test_every_equation_holds(stages, stage, tmp_path):
+    """Eqs 1 to 17, 19 to 23 and 26 to 33, by a checker that knows no library."""
     violations, worst = plan_checker.check(file_of(stages[stage], tmp_path), TOLERANCE)
     assert violations == []
     assert set(worst) >= EQUATIONS | ({"8"} if stage else set())
@@ -76,6 +77,7 @@ DISTURBED = {
 @pytest.mark.parametrize("stage", [0, 1], ids=["relaxed", "polished"])
 @pytest.mark.parametrize("name", DISTURBED)
 def test_any_number_changed_is_named(stages, stage, name, tmp_path):
+    """Eqs 1 to 7, 9 to 15, 19 to 23, 26, 28 and 29 notice."""
     arrays = file_of(stages[stage], tmp_path)
     rng = np.random.default_rng(1)
     weight = stages[stage].meta["mass"] * plan_checker.GRAVITY

@@ -151,6 +151,7 @@ def outside(region: Region, point: np.ndarray) -> float:
 
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_fixed_binaries_have_one_value_in_both_formulations(name):
+    """Eqs 1 to 33, stated in two ways, have the same cost for every gait."""
     rng, both = np.random.default_rng(3), Both(PROBLEMS[name])
     costs, crossings = [], 0
     for _ in range(30):

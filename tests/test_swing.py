@@ -15,12 +15,14 @@ def swing(phase, derivative=0):
 
 
 def test_it_starts_and_ends_where_and_as_fast_as_asked():
+    """What eqs 4 to 6 ask of a swing: places, velocities, no accelerations."""
     np.testing.assert_allclose(swing([0.0, 1.0]), [START, END], atol=1e-12)
     np.testing.assert_allclose(swing([0.0, 1.0], 1), [V0, VF], atol=1e-11)
     np.testing.assert_allclose(swing([0.0, 1.0], 2), np.zeros((2, 3)), atol=1e-9)
 
 
 def test_the_apex_is_at_half_time_and_level():
+    """Eq. 5's last two conditions."""
     assert swing(0.5)[0, 2] == pytest.approx(0.04 + 0.06)
     assert swing(0.5, 1)[0, 2] == pytest.approx(0.0, abs=1e-11)
 
@@ -47,6 +49,7 @@ def test_time_reversal_swaps_the_ends():
 @pytest.mark.parametrize("apex", [False, True])
 @pytest.mark.parametrize("smoothness", [0, 1, 2])
 def test_G_is_square_regular_and_says_what_a_polynomial_does(smoothness, apex):
+    """Eq. 3, for polynomials of any coefficients."""
     G, found = condition_matrix(smoothness, apex), conditions(smoothness, apex)
     assert G.shape == (len(found),) * 2 and abs(np.linalg.det(G)) > 1e-6
     a = np.random.default_rng(0).standard_normal(len(found))

@@ -57,9 +57,72 @@ def situation(robot: Go1Dynamics, stance, wheels, seed: int, wild: float = 1.0) 
     )
 
 
+def following(robot: Go1Dynamics, ref: Reference) -> Reference:
+    """A reference that the robot is on, with the same accelerations."""
+    omega = robot.R_wb @ robot.velocity[3:6]
+    motion = {"com": robot.com, "com_velocity": robot.com_velocity, "R_wb": robot.R_wb, "omega": omega}
+    return replace(ref, ends=robot.centres, end_velocity=robot.centre_velocity, **motion)
+
+
+def turned(R_wb: np.ndarray, axis: int, angle: float) -> np.ndarray:
+    """An orientation after a small turn about an axis of the world."""
+    cross = np.cross(np.eye(3)[axis], np.eye(3))
+    return (np.eye(3) - angle * cross) @ R_wb
+
+
+def test_a_trunk_on_its_reference_goes_on_and_off_it_is_pulled_back(robot):
+    """Eq. 34: a spring and a damper for each direction, and nothing else."""
+    gains = Gains()
+    on = following(robot, situation(robot, *MODES["four feet"], 3))
+    linear, angular = wbc.base_acceleration(robot, on, gains)
+    np.testing.assert_allclose(linear, on.com_acceleration, atol=1e-12)
+    np.testing.assert_allclose(angular, on.angular_acceleration, atol=1e-9)
+    for axis, step in enumerate(1e-6 * np.eye(3)):
+        off = {
+            "com": (0, replace(on, com=on.com + step), gains.com_kp),
+            "com_velocity": (0, replace(on, com_velocity=on.com_velocity + step), gains.com_kd),
+            "R_wb": (1, replace(on, R_wb=turned(on.R_wb, axis, 1e-6)), gains.attitude_kp),
+            "omega": (1, replace(on, omega=on.omega + step), gains.attitude_kd),
+        }
+        for name, (which, ref, gain) in off.items():
+            change = (wbc.base_acceleration(robot, ref, gains)[which] - (linear, angular)[which]) / 1e-6
+            expected = np.broadcast_to(gain, 3) * np.eye(3)[axis]
+            np.testing.assert_allclose(change, expected, rtol=1e-4, atol=1e-3, err_msg=name)
+
+
+def test_a_wheel_is_placed_relative_to_the_robot_and_a_swing_in_the_world(robot, ground):
+    """Eqs 35 and 36: a plan that is elsewhere moves the robot's swings, but not the wheels below it."""
+    gains, shift = Gains(), np.array([0.03, -0.02, 0.01])
+    ref = situation(robot, *MODES["four wheels"], 4)
+    along = wbc.contacts(robot, ground, ref.wheels).basis[:, 0]
+    wheel, swing = wbc.wheel_acceleration(robot, ref, along, gains), wbc.swing_acceleration(robot, ref, gains)
+    elsewhere = replace(ref, com=ref.com + shift, ends=ref.ends + shift)
+    moved = wbc.swing_acceleration(robot, elsewhere, gains)
+    np.testing.assert_allclose(wbc.wheel_acceleration(robot, elsewhere, along, gains), wheel, atol=1e-9)
+    np.testing.assert_allclose(moved - swing, np.tile(gains.swing_kp * shift, (4, 1)), atol=1e-9)
+    ahead = replace(ref, ends=ref.ends + 0.01 * along)
+    pulled = wbc.wheel_acceleration(robot, ahead, along, gains) - wheel
+    np.testing.assert_allclose(pulled, 0.01 * gains.wheel_kp, rtol=1e-9)
+    on = following(robot, ref)
+    np.testing.assert_allclose(wbc.swing_acceleration(robot, on, gains), ref.end_acceleration, atol=1e-12)
+
+
+def test_contact_forces_do_the_work_of_their_points_in_the_equations_of_motion(robot, ground):
+    """Eqs 37 and 39: what is beside M q̈ + h is power of the forces at what they act on."""
+    rng = np.random.default_rng(0)
+    for mode in MODES.values():
+        contact = wbc.contacts(robot, ground, situation(robot, *mode, 2).wheels)
+        E, h = wbc.equations_of_motion(robot, contact)
+        acceleration, forces = rng.standard_normal(18), 50.0 * rng.standard_normal((4, 3))
+        inertial = robot.M @ acceleration + robot.h
+        rest = E @ np.append(acceleration, forces) + h - inertial
+        np.testing.assert_allclose(robot.velocity @ rest, -np.sum(forces * contact.velocity), rtol=1e-9)
+
+
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("seed", range(3))
 def test_the_answer_obeys_the_physics(robot, ground, mode, seed):
+    """Eqs 39 to 43, stated again with the contacts' own Jacobians."""
     ref = situation(robot, *MODES[mode], seed)
     command = wbc.WholeBodyController(robot).tick(ref, ground)
     assert command.solved
@@ -92,6 +155,7 @@ def test_the_answer_obeys_the_physics(robot, ground, mode, seed):
 
 
 def test_osqp_and_an_exact_solver_agree_in_closed_loop(monkeypatch):
+    """The program of eqs 38 to 43."""
     seen = []
     solve = QuadraticProgram.solve
 

@@ -1,4 +1,4 @@
-"""The command line: ``python -m wfbook run TERRAIN | table2 | study | paper | book | lab``."""
+"""The command line: ``python -m wfbook`` and what it can do: run, table2, study, paper, lab and others."""
 
 import argparse
 import contextlib
@@ -30,6 +30,8 @@ from wfbook.arguments import (
     wrong_input,
 )
 from wfbook.book import command as book
+from wfbook.classroom import command as classroom
+from wfbook.equations import command as equations
 from wfbook.paper import command as paper
 from wfbook.report import ProgressLine, plain, search_line, summary_table
 from wfbook.study import command as study
@@ -133,6 +135,8 @@ def _parser() -> argparse.ArgumentParser:
     study.add_to(commands)
     paper.add_to(commands)
     book.add_to(commands)
+    classroom.add_to(commands)
+    equations.add_to(commands)
 
     lab = commands.add_parser("lab", help="open the notebooks in JupyterLab", allow_abbrev=False)
     lab.set_defaults(command=_lab)

@@ -55,14 +55,15 @@ class Robot:
     def reach_lower(self) -> np.ndarray:
         """Lower bound of ``p − x`` for each leg, ``(L, 3)`` (Paper A, eq. 30).
 
-        The paper gives one box for all legs; here each leg's is about its own hip.
+        Not as printed: the paper has one box for all legs, which are at different corners; here each leg's is
+        about its own hip.
         """
         dx, dy, dz = self.reach
         return np.column_stack([self.stance - [dx, dy], np.full(len(self.stance), -self.height - dz)])
 
     @property
     def reach_upper(self) -> np.ndarray:
-        """Upper bound of ``p − x`` for each leg, ``(L, 3)``; a swinging foot may rise by its apex."""
+        """Upper bound of ``p − x`` for each leg, ``(L, 3)``, with the apex of a swing (Paper A, eq. 30)."""
         dx, dy, dz = self.reach
         top = -self.height + dz + self.swing_height
         return np.column_stack([self.stance + np.array([dx, dy]), np.full(len(self.stance), top)])
@@ -132,8 +133,7 @@ def midpoint_integration(x: Any, v: Any, a: Any, dt: float) -> list[Any]:
 def contact_torque(lever: Any, lam: Any) -> list[Any]:
     """Return the torque of each contact about the centre of mass (Paper A, eq. 8).
 
-    The paper prints ``(x − p) × λ``, which is the torque on the ground; the robot feels
-    ``(p − x) × λ``.
+    Not as printed: ``(x − p) × λ`` is the torque on the ground; the robot feels ``(p − x) × λ``.
 
     Args:
         lever: ``p − x``, components of shape ``(K, L)``.
@@ -161,6 +161,9 @@ def bound_terms(lever: Any, lam: Any, scale: float = 1.0) -> tuple[list[Any], li
     asks only for ``U⁺ ≥ Σ plus²`` and ``U⁻ ≥ Σ minus²``: what it adds above the squares is torque
     that no contact makes.
 
+    Not as printed: the paper leaves out the inequality, without which U± have no least value, and its Table I
+    calls them bounds of θ. They bound a leg's torque.
+
     Args:
         lever: ``p − x``, components of shape ``(K, L)``.
         lam: contact forces, components of shape ``(K, L)``.
@@ -178,7 +181,7 @@ def bound_terms(lever: Any, lam: Any, scale: float = 1.0) -> tuple[list[Any], li
 
 
 def least_bounds(lever: Any, lam: Any, scale: float = 1.0) -> tuple[list[Any], list[Any]]:
-    """Return the least U⁺ and U⁻ that eq. 9 allows: the squares themselves (Paper A, eq. 9).
+    """Return the least U⁺ and U⁻ that Paper A, eq. 9, allows: the squares themselves.
 
     Args:
         lever: ``p − x``, components of shape ``(K, L)``.
@@ -237,7 +240,7 @@ def roll_out(
     v: np.ndarray | None = None,
     momentum: np.ndarray | None = None,
 ) -> RollOut:
-    """Follow eqs 1 and 8 forward in time by the paper's midpoint rule (Paper A, eqs 1 and 8).
+    """Follow Paper A, eqs 1 and 8, forward in time by the paper's midpoint rule.
 
     The rule is that of :func:`midpoint_integration`, solved for what comes next; levers are taken at the
     middle of each interval, as the planner takes them.

@@ -1,4 +1,4 @@
-"""Chapter 7: where am I and how fast? An error-state Kalman filter (Paper A, eq. 44).
+"""Chapter 7: where am I and how fast? An error-state Kalman filter.
 
 The robot feels its accelerations and its rotation, and it knows where its legs' ends are relative to its
 trunk. Integrating the first drifts within seconds. The second says nothing about the world, except that
@@ -14,7 +14,7 @@ three models can be chosen (:data:`WHEEL_MODELS`):
 ``"slack"``
     it is not; the wheel may go anywhere along ``t`` (large process noise there) and nowhere across.
 ``"printed"``
-    eq. 44 of the paper. It does not work, see :func:`wfbook.leg_odometry.expected_ends`.
+    Paper A, eq. 44. It does not work, see :func:`wfbook.leg_odometry.expected_ends`.
 """
 
 from dataclasses import dataclass, replace

@@ -1,10 +1,11 @@
-"""Chapter 4: what force a foot or a wheel may apply (Paper A, eqs 26–29).
+"""Chapter 4: what force a foot or a wheel may apply (Paper A, eqs 26 and 29).
 
 A contact's force is written in the basis of its region: ``n`` along the normal, ``t`` along the
 rolling direction, ``b`` across it. A foot grips both ways; a wheel grips across but rolls along.
 
 The arguments of :func:`friction_pyramid` and :func:`rolling_friction` are NumPy arrays or CVXPY expressions:
-the same lines state the planner's constraints and check its answer. The rest tells what they give away.
+the same lines state the planner's constraints and check its answer. Which of them hold, D says (eqs 27 and
+28): that is the planner's. The rest tells what they give away.
 """
 
 from typing import Any
@@ -137,8 +138,8 @@ def steepest_slope(mu_t: float, mu_b: float, heading: float = 0.0, cone: bool = 
 def rolling_friction(n: Any, coefficient: float, direction: Any = 1.0) -> Any:
     """Return the force along ``t`` that rolling resistance adds to a wheel (Paper A, eq. 29).
 
-    The paper prints it with a positive sign, which would push the robot forward. Resistance opposes
-    rolling, hence the minus.
+    Not as printed: with the paper's positive sign it would push the robot forward. Resistance opposes
+    rolling, hence the minus. And ``‖n‖²`` is 1, for n is a unit vector.
 
     Args:
         n: normal force on the wheel, any shape.

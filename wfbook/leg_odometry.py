@@ -183,10 +183,12 @@ def expected_ends(state: BaseState, printed: np.ndarray) -> tuple[np.ndarray, np
     """Return where the legs' ends should be, seen from the inertial unit, and its Jacobian (Paper A, eq. 44).
 
     A leg's kinematics measure ``R_wbᵀ(p − r)``. Eq. 44 adds ``W v`` for a wheel, ``W = [1, 0, 0]ᵀ``: the
-    forward velocity of the trunk. That adds metres a second to metres. It also says the wrong thing. With
-    the wheel's end taken to rest, as feet do, the measured ``p − r`` of a wheel that rolls along with the
-    trunk does not change, so ``r + v`` may not change either: ``v̇ = −v``, and whatever speed the
-    inertial unit reports is corrected away, only within a second instead of at once.
+    forward velocity of the trunk.
+
+    Not as printed: it adds metres a second to metres. It also says the wrong thing. With the wheel's end
+    taken to rest, as feet do, the measured ``p − r`` of a wheel that rolls along with the trunk does not
+    change, so ``r + v`` may not change either: ``v̇ = −v``, and whatever speed the inertial unit reports is
+    corrected away, only within a second instead of at once.
 
     Args:
         state: of the robot.

@@ -175,7 +175,7 @@ class LegPath:
 
 
 def leg_path(ride: Ride, S: np.ndarray, D: np.ndarray) -> LegPath:
-    """Return the path that one leg's rows of S and D ask for.
+    """Return the path that one leg's rows of S and D ask for (Paper A, eqs 6, 18–25 and 30).
 
     Landings are as near below the hip as the rules allow: the sum of ``|x − x_hip|`` over slots is least.
 

@@ -1,4 +1,4 @@
-"""Chapter 3: which leg swings when, and what touches the ground where (Paper A, eqs 10–25).
+"""Chapter 3: which leg swings when, and what touches the ground where (Paper A, eqs 10–17, 22, 23).
 
 Two binary arrays say everything a plan decides. The *swing matrix* ``S[l, j]`` is 1 when leg ``l``
 is in the air during slot ``j``. The *dynamics matrix* ``D[l, j, r, e]`` is 1 when leg ``l`` belongs
@@ -106,6 +106,9 @@ def start_dynamics(start_regions: Iterable[int], start: Iterable[str], regions: 
 def swing_count(S: np.ndarray) -> np.ndarray:
     """Return which number of legs swings in each slot (Paper A, eqs 13, 14).
 
+    Not as printed: the paper counts from one leg on, so that no s says that no leg swings. And that all do
+    must be excluded, see :func:`contact_centroid`.
+
     Args:
         S: swing matrix, ``(L, J)``.
 
@@ -126,6 +129,8 @@ def contact_centroid(p: np.ndarray, S: np.ndarray) -> np.ndarray:
     """Return the centroid of the contacts that stand (Paper A, eqs 10–12 and 15).
 
     Equations 10 and 11 are a product, ``v_l = (1 − S_l) p_l``; eq. 15 divides their sum by how many stand.
+
+    Not as printed, eq. 15: ``n = N_l`` is excluded, for it divides by zero: no feet have no middle.
 
     Args:
         p: ``(K, L, 3)`` contact points at the knots after each interval, in the world.
@@ -154,6 +159,9 @@ def contact_centroid(p: np.ndarray, S: np.ndarray) -> np.ndarray:
 
 def regions_allowed(D: np.ndarray, groups: Iterable[Iterable[int]]) -> np.ndarray:
     """Return which regions a standing leg may touch (Paper A, eqs 22, 23).
+
+    Not as printed, eq. 22: the paper asks it at all times, but a leg in the air is over a gap. Here it holds
+    where a leg stands and where it lands.
 
     Args:
         D: dynamics matrix, ``(L, J, R, E)``.
@@ -192,7 +200,12 @@ class Broken:
 
 
 def broken_rules(S: np.ndarray, D: np.ndarray, start: np.ndarray) -> list[Broken]:
-    """Check what S and D owe each other, whatever the motion (Paper A, eqs 12, 16, 17).
+    """Check what S and D owe each other, whatever the motion (Paper A, eqs 16, 17; a mean for eq. 12).
+
+    Not as printed, eq. 16: it holds in the first slot, too, against what the robot stands on when it starts,
+    or a leg could begin with a wheel that it never put on.
+
+    Not as printed, eq. 17: the second sum runs over an index that is not there; it is e.
 
     Args:
         S: swing matrix, ``(L, J)``, of 0 and 1.

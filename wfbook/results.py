@@ -56,6 +56,7 @@ class ResultFolder:
         self.target.mkdir(exist_ok=True)
         for name in self._names:
             if (self.path / name).exists():
+                (self.target / name).parent.mkdir(exist_ok=True)
                 os.replace(self.path / name, self.target / name)
             else:
                 (self.target / name).unlink(missing_ok=True)

@@ -1,9 +1,10 @@
-"""Chapter 2: the path of an end effector through the air (Paper A, eqs 2–7).
+"""Chapter 2: the path of an end effector through the air (Paper A, eqs 2–6).
 
 A swing is a polynomial in the phase ``s ∈ [0, 1]`` of its slot: a quintic in each horizontal
 direction, a septic in the vertical. The polynomial is *linear* in what it has to meet (start, end,
 apex), which is what lets a convex program move footholds freely: the basis functions below are
-computed once from eq. 3, and everything else is a matrix product.
+computed once from eq. 3, and everything else is a matrix product. That a leg in the air applies no force
+(eq. 7) is a line of the program, see :mod:`wfbook.planner`.
 """
 
 from functools import cache
@@ -50,7 +51,7 @@ def condition_matrix(smoothness: int = 2, apex: bool = False) -> np.ndarray:
 
 @cache
 def _coefficients(smoothness: int, apex: bool) -> np.ndarray:
-    """Solve eq. 3, ``G a = g``, once for unit right-hand sides.
+    """Solve Paper A, eq. 3, ``G a = g``, once for unit right-hand sides.
 
     Returns:
         ``(n, n)``: column ``i`` holds the coefficients (ascending powers, eq. 2) of the polynomial
@@ -108,6 +109,9 @@ def septic_basis(phase: np.ndarray, derivative: int = 0, smoothness: int = 2) ->
     The height at phase ``s`` is ``z0 * B[..., 0] + zf * B[..., 1] + z_apex * B[..., 2]``; velocity and
     acceleration are zero at both ends, velocity is zero at the apex.
 
+    Not as printed, eq. 5: vertical velocities are zero at the ends, on a ramp a rolling wheel's is not. There
+    the controller puts in the slope times the forward velocity.
+
     Args:
         phase: any shape ``(...)``, 0 at lift-off and 1 at touch-down.
         derivative: order of the derivative by the phase.
@@ -131,6 +135,10 @@ def swing_position(
     smoothness: int = 2,
 ) -> np.ndarray:
     """Evaluate a swing, or its time derivatives, in the world frame (Paper A, eqs 2–6).
+
+    Not as printed, eqs 4–6: the polynomial is one of the phase, so the velocities in its conditions are by
+    phase. Those here are by time, and come times the swing's duration, a factor that the paper does not
+    write.
 
     Args:
         phase: ``(n,)`` phase of the swing, 0 at lift-off and 1 at touch-down.

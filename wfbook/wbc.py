@@ -6,13 +6,8 @@ rolling wheels, friction and the motors' limits? The torques follow.
 
 The unknowns are ``u = [q̈, λ]``: 18 accelerations (:mod:`wfbook.go1_dynamics`) and for each leg the force
 along ``t``, ``b`` and ``n``. The paper carries the torques as unknowns too; eq. 39 gives them from the
-others, so here they are eliminated. Where the paper's program is not usable as printed:
-
-- eq. 38 is singular: several forces do the same work. A small price on λ and q̈ picks one.
-- eq. 35 needs ``w`` *relative to the robot*: in the world, a wheel task fights the rolling itself.
-- eq. 41 needs the turning of the wheel's axle, ``ḃ·v``, or a yawing robot scrubs its wheels sideways.
-- eq. 42 with a traction coefficient would let the program push with wheels that no motor turns.
-- while no foot is down nothing can move the robot along the rolling direction, so no task may ask for it.
+others, so here they are eliminated. Where the paper's program is not usable as printed, the functions say so.
+And while no foot is down nothing can move the robot along the rolling direction, so no task may ask for it.
 """
 
 from dataclasses import dataclass, replace
@@ -69,7 +64,7 @@ class Contacts:
 
 
 def contacts(robot: Go1Dynamics, ground: Ground, wheels: np.ndarray) -> Contacts:
-    """Return the contacts of a robot on a ground (bases of Paper A, eq. 26).
+    """Return the contacts of a robot on a ground, in the bases of eq. 26.
 
     A foot has the basis of its region. A wheel rolls where it points: t is square to its axle.
     """
@@ -81,7 +76,7 @@ def contacts(robot: Go1Dynamics, ground: Ground, wheels: np.ndarray) -> Contacts
 
 
 def contact_basis(robot: Go1Dynamics, ground: Ground, wheels: np.ndarray) -> np.ndarray:
-    """Return the rows t, b, n of each contact in the world, ``(4, 3, 3)`` (Paper A, eq. 26)."""
+    """Return the rows t, b, n of each contact in the world, ``(4, 3, 3)``, as eq. 26 has them."""
     n, t = ground.normals, ground.tangents
     if wheels.any():
         heading = cross(robot.axles, n)
@@ -119,8 +114,8 @@ def attitude_error(robot: Go1Dynamics, ref: Reference) -> np.ndarray:
 def wheel_acceleration(robot: Go1Dynamics, ref: Reference, along: np.ndarray, gains: Gains) -> np.ndarray:
     """Return how each wheel should accelerate relative to the robot along ``along`` (Paper A, eq. 35).
 
-    ``w`` is the wheel's place relative to the CoM. The paper does not say relative to what; measured in
-    the world, the task holds the wheels where the plan has them and the robot rolls off them.
+    Not as printed: ``w`` is the wheel's place relative to the CoM. The paper does not say relative to what;
+    measured in the world, the task holds the wheels where the plan has them and the robot rolls off them.
 
     Args:
         robot: at the present state.
@@ -149,8 +144,10 @@ def equations_of_motion(robot: Go1Dynamics, contact: Contacts) -> tuple[np.ndarr
     """Return ``E`` and ``h`` such that ``E u + h = S τ`` (Paper A, eqs 37 and 39).
 
     ``E = [M, −Jᵀ]``, ``(18, 30)``. The trunk's six rows have no motor: ``S τ`` is zero there and they are the
-    program's dynamics constraint. The other twelve are the torques. (The paper prints one λ for feet
-    and wheels in eq. 39; they are two, as in eq. 37. Here each leg has one of its own.)
+    program's dynamics constraint. The other twelve are the torques.
+
+    Not as printed, eq. 39: it has one λ for feet and wheels, which are two, as in eq. 37; here each leg has
+    one of its own. And the q̈ in it are those of the joints and of the trunk, 18 and not 12.
     """
     return np.hstack([robot.M, -contact.jacobian.reshape(12, 18).T]), robot.h
 
@@ -158,8 +155,8 @@ def equations_of_motion(robot: Go1Dynamics, contact: Contacts) -> tuple[np.ndarr
 def stationary_feet(contact: Contacts, damping: float) -> np.ndarray:
     """Return what ``J q̈`` must be for feet that stay, ``(4, 3)`` along t, b, n (Paper A, eq. 40).
 
-    The paper keeps the velocity of a standing foot constant. A foot that has just landed bounces or slides a
-    little; ``damping`` brings it to rest.
+    Not as printed: the paper keeps the velocity of a standing foot constant. A foot that has just landed
+    bounces or slides a little; ``damping`` brings it to rest.
     """
     return -contact.drift - damping * contact.velocity
 
@@ -167,9 +164,10 @@ def stationary_feet(contact: Contacts, damping: float) -> np.ndarray:
 def fixed_wheels(contact: Contacts, damping: float, turning_axle: bool = True) -> np.ndarray:
     """Return what ``J q̈`` must be for wheels that roll but don't slide, ``(4, 3)`` (Paper A, eq. 41).
 
-    Only the entries along b and n are constraints; rolling is free. The axle turns with the calf, so
-    ``d(b·v)/dt = b·a + ḃ·v`` with ``ḃ = −ω_n t``: without the second term (the paper has none) a wheel that
-    rolls and yaws is asked to slide. ``damping`` as for feet.
+    Only the entries along b and n are constraints; rolling is free. ``damping`` as for feet.
+
+    Not as printed: the axle turns with the calf, so ``d(b·v)/dt = b·a + ḃ·v`` with ``ḃ = −ω_n t``. The paper
+    has no second term, and a wheel that rolls and yaws is asked to slide.
     """
     required = -contact.drift - damping * contact.velocity
     required[:, 1] += turning_axle * contact.yaw_rate * contact.velocity[:, 0]
@@ -179,11 +177,11 @@ def fixed_wheels(contact: Contacts, damping: float, turning_axle: bool = True) -
 def friction_pyramids(ground: Ground, contact: Contacts, wheels: np.ndarray) -> np.ndarray:
     """Return ``P`` of each leg, ``(4, 9, 3)`` along t, b, n, so that ``P λ ≤ 0`` (Paper A, eqs 26 and 42).
 
-    The paper's four sides hold ``t`` and ``b`` apart: together they allow a foot 1.4 times the force at
-    which it slides. Here a foot has eight, all inside the cone.
+    Not as printed: the paper's four sides hold ``t`` and ``b`` apart: together they allow a foot 1.4 times
+    the force at which it slides. Here, in the controller, a foot has eight, all inside the cone.
 
-    A free wheel has no traction to choose: along t it feels rolling resistance alone (eq. 29), against
-    its motion, so its pyramid is flat there.
+    Not as printed, eq. 42: a free wheel has no traction to choose. Along t it feels rolling resistance alone
+    (eq. 29), against its motion, so its pyramid is flat there.
     """
     resistance = ground.rolling_resistance * np.tanh(contact.velocity[:, 0] / ROLLING_SPEED)
     grip = inner_coefficient(ground.mu_foot, _SIDES)
@@ -202,6 +200,9 @@ def tasks(
     robot: Go1Dynamics, ref: Reference, contact: Contacts, gains: Gains
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return ``G``, ``g`` and weights of the tasks ``‖G q̈ − g‖²`` (Paper A, eq. 38).
+
+    Not as printed: several forces do the same work, and the paper's program prefers none: it is singular. A
+    small price on λ and q̈ picks one (:meth:`WholeBodyController.problem`).
 
     Rows: CoM (3), trunk (3), then three for each leg: a swinging leg's end, a rolling wheel's place, or
     nothing for a standing foot.
@@ -281,6 +282,9 @@ class WholeBodyController:
         self, ref: Reference, ground: Ground
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, Contacts]:
         """Return the program of Paper A, eqs 38–43, at the robot's state.
+
+        Not as printed, eq. 43: torques are no unknowns here, so their limits are rows in q̈ and λ. The answer
+        is the same.
 
         Returns:
             P ``(30, 30)``, q ``(30,)``, A ``(66, 30)``, l and c ``(66,)`` of ``min ½ uᵀP u + qᵀu``

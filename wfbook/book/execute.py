@@ -159,7 +159,6 @@ async def _kernel(client: NotebookClient, folder: Path) -> AsyncIterator[None]:
             client.kc.stop_channels()
         if manager.has_kernel:
             await manager.shutdown_kernel(now=True)
-        manager.cleanup_resources()
 
 
 def _what(error: Exception) -> str:

@@ -1,6 +1,5 @@
 """The pages around the chapters: title, equations, the papers' numbers, licences."""
 
-import importlib.util
 import re
 import shutil
 from collections.abc import Collection, Iterator, Sequence
@@ -8,6 +7,7 @@ from pathlib import Path
 from string import Template
 
 import wfbook
+from wfbook import equations
 from wfbook.book.chapters import Chapter
 from wfbook.book.links import SECOND_PART
 from wfbook.view.meshcat_static import sharing
@@ -41,8 +41,8 @@ def write(
         OSError: something can't be read or written.
     """
     pages = []
-    if "equations" in parts and (text := equation_map(chosen)) is not None:
-        _put(sources / "equations.md", text)
+    if "equations" in parts:
+        _put(sources / "equations.md", equation_map(chosen))
         pages.append("equations")
     if "paper" in parts:
         _put_paper(sources / "paper", paper)
@@ -55,16 +55,12 @@ def write(
     _put(sources / "index.md", _title_page(chosen, pages))
 
 
-def equation_map(chosen: Sequence[Chapter]) -> str | None:
-    """Return the table of equations as Markdown; None while the library has none.
+def equation_map(chosen: Sequence[Chapter]) -> str:
+    """Return the map of all equations as Markdown.
 
     Args:
         chosen: the chapters in the book; links to others become text.
     """
-    if importlib.util.find_spec("wfbook.equations") is None:
-        return None
-    from wfbook import equations
-
     there = {f"{chapter.page}.ipynb" for chapter in chosen}
     page = equations.page(notebooks="chapters")
     return _TO_CHAPTER.sub(lambda link: link[0] if link[2] in there else link[1], page)

@@ -1,6 +1,8 @@
 """How a check tells that an answer is wrong, and reads answers of any kind without stumbling."""
 
-from collections.abc import Callable
+import contextlib
+from collections.abc import Callable, Iterator
+from contextvars import ContextVar
 from typing import Any
 
 import numpy as np
@@ -69,6 +71,46 @@ def called(function: Callable[..., Any], *arguments: Any, name: str) -> Any:
         if isinstance(old, np.ndarray) and not np.array_equal(old, new, equal_nan=True):
             raise WrongAnswer(f"{name} changed its argument number {index + 1}; return a new array instead")
     return answer
+
+
+class Draws:
+    """What a check drew.
+
+    Attributes:
+        salt: that changes what is drawn; None for what a reader's check draws.
+        drawn: whether anything was.
+    """
+
+    def __init__(self, salt: int | None) -> None:
+        self.salt = salt
+        self.drawn = False
+
+
+_DRAWS: ContextVar[Draws | None] = ContextVar("draws", default=None)
+
+
+def draws(seed: int) -> np.random.Generator:
+    """Return what a check draws its inputs with.
+
+    The same for every reader, so that a message can be talked about. Grading tries others, too, with
+    :func:`other_draws`: an answer that knows the book's inputs by heart fails there.
+    """
+    now = _DRAWS.get()
+    if now is None:
+        return np.random.default_rng(seed)
+    now.drawn = True
+    return np.random.default_rng(seed if now.salt is None else [seed, now.salt])
+
+
+@contextlib.contextmanager
+def other_draws(salt: int | None) -> Iterator[Draws]:
+    """Have checks draw other inputs, and tell whether they draw any; with None they are the same."""
+    now = Draws(salt)
+    token = _DRAWS.set(now)
+    try:
+        yield now
+    finally:
+        _DRAWS.reset(token)
 
 
 def _short(value: Any) -> str:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from wfbook.centroidal import Robot, least_bounds, roll_out
-from wfbook.exercises.answer import WrongAnswer, array, called, number
+from wfbook.exercises.answer import WrongAnswer, array, called, draws, number
 from wfbook.modes import LEGS
 
 _AXES = ("roll", "pitch", "yaw")
@@ -51,7 +51,7 @@ def torque(function: Callable[..., Any]) -> str:
     Args:
         function: of contacts ``(L, 3)``, centre of mass ``(3,)`` and forces ``(L, 3)``.
     """
-    rng = np.random.default_rng(1)
+    rng = draws(1)
     p, x = standing(Robot.go1())
     x += np.array([0.3, -0.1, 0.0])
     for leg, name in enumerate(LEGS):
@@ -81,7 +81,7 @@ def torque(function: Callable[..., Any]) -> str:
 
 def bounds(function: Callable[..., Any]) -> str:
     """Check a function ``bounds(r, F, s)`` that returns the least U⁺ and U⁻ of ``r F`` (eq. 9)."""
-    rng = np.random.default_rng(2)
+    rng = draws(2)
     for r, force, s in zip(
         rng.uniform(-0.3, 0.3, 20), rng.uniform(-50, 50, 20), rng.uniform(3, 30, 20), strict=True
     ):

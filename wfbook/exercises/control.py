@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from wfbook import simulate
-from wfbook.exercises.answer import WrongAnswer, array, called, number
+from wfbook.exercises.answer import WrongAnswer, array, called, draws, number
 from wfbook.go1 import leg_kinematics
 from wfbook.reference import Gains, delay_margin
 from wfbook.stance import limits_reached, stand
@@ -138,7 +138,7 @@ def leg_jacobian(function: Callable[..., Any]) -> str:
     Raises:
         WrongAnswer: which entry is wrong, and what it should be.
     """
-    rng = np.random.default_rng(6)
+    rng = draws(6)
     for _ in range(_STATES):
         q = np.array([rng.uniform(0.2, 1.2), rng.uniform(-2.2, -1.0)])
         rate = rng.uniform(-3.0, 3.0, 2)

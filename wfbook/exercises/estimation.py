@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 
 from wfbook import ideal, kalman
-from wfbook.exercises.answer import WrongAnswer, array, called, number
+from wfbook.exercises.answer import WrongAnswer, array, called, draws, number
 from wfbook.go1 import FOOT_RADIUS
 from wfbook.go1_dynamics import cross
 from wfbook.recording import odometry
@@ -84,7 +84,7 @@ def kalman_step(function: Callable[..., Any]) -> str:
     Raises:
         WrongAnswer: it breaks a rule; the message says in which step.
     """
-    random = np.random.default_rng(7)
+    random = draws(7)
     for _ in range(5):
         dt, sigma_a, sigma_z = random.uniform([0.01, 0.5, 0.05], [0.5, 2.0, 0.5])
         v0, P0 = random.normal(), random.uniform(0.01, 1.0)
@@ -147,7 +147,7 @@ def rolling(function: Callable[..., Any]) -> str:
         WrongAnswer: ``e`` is not zero where an end rolls, or not right where it slips, or ``H`` does not
             agree with finite differences of ``e``.
     """
-    random = np.random.default_rng(44)
+    random = draws(44)
     some = random.standard_normal
     for case in range(6):
         R_wb, stick_rate, spin = pin.exp3(some(3)), some(3), 5.0 * some(3)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from wfbook.exercises.answer import WrongAnswer, array, called, number
+from wfbook.exercises.answer import WrongAnswer, array, called, draws, number
 from wfbook.friction import friction_cone, friction_pyramid, rolling_friction, steepest_slope
 from wfbook.modes import LEGS
 from wfbook.standing import plane, stand
@@ -46,7 +46,7 @@ def admits(inside: Callable[[np.ndarray, Region, str], bool], cases: int = 400) 
         inside: from a force ``(3,)`` in the world, a region and ``"foot"`` or ``"wheel"`` to yes or no.
         cases: how many random forces are tried.
     """
-    random = np.random.default_rng(4)
+    random = draws(4)
     for case in range(cases):
         slope = np.radians(random.choice([0.0, 12.0, -20.0]))
         (region,) = plane(0.5, 0.0, slope).regions
@@ -146,7 +146,7 @@ def safe(pyramid: Callable[[float, int], np.ndarray]) -> str:
         pyramid: from μ and the number of sides to rows ``(sides, 3)`` along n, t, b: a force is admitted if
             no row times the force is positive.
     """
-    random = np.random.default_rng(5)
+    random = draws(5)
     for mu, sides in ((0.7, 4), (0.4, 8), (0.25, 5), (1.0, 16)):
         rows = array(called(pyramid, mu, sides, name="pyramid"), (sides, 3), "the rows")
         case = f"μ = {mu}, {sides} sides"

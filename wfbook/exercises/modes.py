@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from wfbook.exercises.answer import WrongAnswer, array, called, number
+from wfbook.exercises.answer import WrongAnswer, array, called, draws, number
 from wfbook.leg_path import Ride, bank_and_deck, leg_path
 from wfbook.modes import END_EFFECTORS, LEGS, broken_rules, contact_centroid, legal_rows
 
@@ -46,7 +46,7 @@ def dynamics_rows(write: Callable[[np.ndarray, list[tuple[int, int]], np.ndarray
     Raises:
         WrongAnswer: a slot breaks an equation, or the leg lands elsewhere.
     """
-    rng = np.random.default_rng(3)
+    rng = draws(3)
     for swings in ("0", "1", "01", "0100", "10010", "001101", "111", "000000"):
         S, regions = np.array([int(s) for s in swings]), int(rng.integers(1, 4))
         landings = [(int(rng.integers(regions)), int(rng.integers(2))) for _ in range(S.sum())]
@@ -74,7 +74,7 @@ def least_m(find: Callable[[np.ndarray, float, np.ndarray, np.ndarray], Any]) ->
     Raises:
         WrongAnswer: M cuts off a corner of the box at D = 0, or is larger than it must be.
     """
-    rng = np.random.default_rng(1)
+    rng = draws(1)
     for case in range(40):
         n = 1 + case % 3
         a, low = rng.normal(size=n), rng.normal(size=n)
@@ -112,7 +112,7 @@ def centroid(find: Callable[[np.ndarray, np.ndarray], Any]) -> str:
     Raises:
         WrongAnswer: with the legs that swing.
     """
-    rng = np.random.default_rng(2)
+    rng = draws(2)
     for S in product((0, 1), repeat=len(LEGS)):
         column = np.array(S)
         if column.all():

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wfbook.exercises.answer import WrongAnswer, array, called
+from wfbook.exercises.answer import WrongAnswer, array, called, draws
 from wfbook.modes import LEGS
 from wfbook.omni.robot import WHEEL_POSITIONS, WHEEL_RADIUS
 from wfbook.omni.wheels import (
@@ -55,7 +55,7 @@ def nears(nearer: Callable[[float, float], tuple[float, float]], cases: int = 40
             sign: 1 forward, -1 backward.
         cases: how many random pairs are tried.
     """
-    random = np.random.default_rng(9)
+    random = draws(9)
     pairs = [(np.radians(179.0), np.radians(-179.0)), (3.0, -3.0), (0.1, 6.0 * np.pi), (-2.0, 2.5)]
     pairs += [tuple(pair) for pair in random.uniform(-10.0, 10.0, (cases, 2))]
     for desired, current in pairs:
@@ -87,7 +87,7 @@ def measures(odometry: Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray
         odometry: from steering angles ``(n,)``, speeds ``(n,)`` and positions ``(n, 2)`` to the twist.
         cases: how many random bases are tried.
     """
-    random = np.random.default_rng(10)
+    random = draws(10)
     for case in range(cases):
         n = 4 if case < cases // 2 else int(random.integers(2, 7))
         positions = WHEEL_POSITIONS if n == 4 else random.normal(size=(n, 2))

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from wfbook.centroidal import GRAVITY
-from wfbook.exercises.answer import WrongAnswer, array, called, number
+from wfbook.exercises.answer import WrongAnswer, array, called, draws, number
 from wfbook.omni.robot import WHEEL_POSITIONS
 from wfbook.omni.support import Contact, axes_on, balance, gravity_wrench, zmp
 from wfbook.omni.tipping import WIDTH, strongest_push
@@ -55,7 +55,7 @@ def admits(inside: Callable[[np.ndarray, float, float], bool], cases: int = 400)
         inside: from a wrench ``(6,)``, μ and the width to yes or no.
         cases: how many random wrenches are tried.
     """
-    random = np.random.default_rng(10)
+    random = draws(10)
     for case in range(cases):
         mu, width = random.uniform(0.3, 1.0), random.uniform(0.02, 0.08)
         press = random.exponential(60.0, 2)
@@ -95,7 +95,7 @@ def charges(alpha: Callable[[np.ndarray, np.ndarray, np.ndarray], tuple[float, n
     Args:
         alpha: from ``A (m, 6)``, ``b (m,)`` and a wrench ``(6,)`` to the penalty and its gradient ``(6,)``.
     """
-    random = np.random.default_rng(9)
+    random = draws(9)
     cone = line_contact(0.6, 0.05)
     for case in range(60):
         wrench = random.normal(size=6) * [60, 60, 40, 2, 0.5, 1] + [0, 0, 80, 0, 0, 0]
@@ -133,7 +133,7 @@ def finds(point: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> str:
     Args:
         point: from forces ``(n, 3)`` and the points ``(n, 3)`` where they act to x and y ``(2,)``.
     """
-    random = np.random.default_rng(11)
+    random = draws(11)
     for level in (True, False):
         for _ in range(20):
             places = random.uniform(-0.5, 0.5, (5, 3))

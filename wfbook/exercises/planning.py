@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wfbook.exercises.answer import WrongAnswer, array, called, number
+from wfbook.exercises.answer import WrongAnswer, array, called, draws, number
 from wfbook.modes import LEGS
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def what_is_left(function: Callable[..., Any], seed: int = 3) -> str:
     Raises:
         WrongAnswer: a node is dropped or kept wrongly, or the proof is wrong; with the node's number.
     """
-    rng = np.random.default_rng(seed)
+    rng = draws(seed)
     for trial in range(40):
         bounds = rng.uniform(0.2, 1.2, int(rng.integers(1, 8))).round(3)
         incumbent = np.inf if trial == 0 else round(float(rng.uniform(0.3, 1.2)), 3)

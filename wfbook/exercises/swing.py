@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wfbook.exercises.answer import WrongAnswer, array, called, number
+from wfbook.exercises.answer import WrongAnswer, array, called, draws, number
 from wfbook.go1 import FOOT_RADIUS, nominal
 from wfbook.go1_dynamics import Go1Dynamics, leg_motion
 from wfbook.swing import swing_position
@@ -50,7 +50,7 @@ def solves(coefficients: Callable[[float, float, float, float, float], np.ndarra
         coefficients: from ``p0, v0, pf, vf, T`` to six coefficients in ascending powers of time in seconds.
         cases: how many random swings are tried.
     """
-    random = np.random.default_rng(2)
+    random = draws(2)
     for _ in range(cases):
         p0, pf, v0, vf = random.uniform(-1.0, 1.0, 4)
         T = random.uniform(0.1, 1.0)

@@ -1,4 +1,4 @@
-"""Chapter 11: the terms of eq. 17, each one function that makes one Crocoddyl cost (Paper B, eq. 17).
+"""Chapter 11: the terms of the cost, each one function that makes one of Crocoddyl's (Paper B, eq. 17).
 
 A term is a residual (what should be zero), an activation (how it is weighed, row by row) and a weight. The
 state is the paper's, steering, wheels and gripper locked: trunk, eight joints of the legs, six of the arm.
@@ -24,7 +24,7 @@ LEG_JOINTS, ARM_JOINTS = slice(6, 14), slice(14, 20)
 
 @dataclass(frozen=True)
 class Weights:
-    """Weights of eq. 17; rates are per second, so that they do not depend on the time step.
+    """Weights of Paper B, eq. 17; rates are per second, so that they do not depend on the time step.
 
     Attributes:
         leg: of a swinging wheel's position.
@@ -80,13 +80,13 @@ def _cost(
 
 
 def leg(model: Model, frame: str, weights: Weights) -> crocoddyl.CostModelAbstract:
-    """Return the cost of a swinging wheel's distance from where it should be, l_leg of eq. 17."""
+    """Return the cost of a swinging wheel's distance from where it should be, l_leg of Paper B, eq. 17."""
     residual = crocoddyl.ResidualModelFrameTranslation(model.state, model.frame(frame), np.zeros(3), model.nu)
     return _cost(model, residual, np.full(3, weights.leg))
 
 
 def com(model: Model, weights: Weights) -> crocoddyl.CostModelAbstract:
-    """Return the cost of the centre of mass's distance from where it should be, l_CoM of eq. 17."""
+    """Return the cost of the centre of mass's distance from its reference, l_CoM of Paper B, eq. 17."""
     residual = crocoddyl.ResidualModelCoMPosition(model.state, np.zeros(3), model.nu)
     return _cost(model, residual, np.array(weights.com))
 
@@ -104,7 +104,7 @@ def pyramid(mu: float, R_fc: np.ndarray | None = None) -> crocoddyl.FrictionCone
 
 
 def contact(model: Model, frame: str, mu: float, weights: Weights) -> crocoddyl.CostModelAbstract:
-    """Return the penalty on force outside the pyramid, l_fc of eq. 17 (Paper B, eqs 8 and 9).
+    """Return the penalty on force outside the pyramid, l_fc (Paper B, eqs 8, 9 and 17).
 
     A contact has forces only here, no moments: moments about the axle no free wheel can have, and the line's
     others would make eq. 4 singular, for what two wheels could do by twisting four do by pushing.
@@ -117,19 +117,23 @@ def contact(model: Model, frame: str, mu: float, weights: Weights) -> crocoddyl.
 
 
 def effort(model: Model, weights: Weights) -> crocoddyl.CostModelAbstract:
-    """Return the cost of torques other than those that hold the robot, l_reg of eq. 17."""
+    """Return the cost of torques other than those that hold the robot, l_reg of Paper B, eq. 17."""
     return _cost(model, crocoddyl.ResidualModelControl(model.state, np.zeros(model.nu)))
 
 
 def trunk(model: Model, weights: Weights) -> crocoddyl.CostModelAbstract:
-    """Return the cost of the trunk's orientation, l_pos of eq. 17."""
+    """Return the cost of the trunk's orientation, l_pos of Paper B, eq. 17."""
     frame = model.frame("trunk")
     residual = crocoddyl.ResidualModelFrameRotation(model.state, frame, np.eye(3), model.nu)
     return _cost(model, residual, np.array(weights.trunk))
 
 
 def posture(model: Model, weights: Weights) -> crocoddyl.CostModelAbstract:
-    """Return the cost of the joints' angles and of all velocities, l_sigma of eq. 17 and part of l_arm."""
+    """Return the cost of the joints' angles and of all velocities, l_sigma of Paper B, eq. 17.
+
+    Not as printed: l_sigma is the steering's, which is locked in the 41 states. Here it is the legs' joints
+    and all velocities, with the arm's joints, a part of l_arm.
+    """
     nv = model.state.nv
     rows = np.zeros(2 * nv)
     rows[LEG_JOINTS], rows[ARM_JOINTS], rows[nv:] = weights.posture, weights.arm_posture, weights.velocity
@@ -138,14 +142,14 @@ def posture(model: Model, weights: Weights) -> crocoddyl.CostModelAbstract:
 
 
 def hand(model: Model, weights: Weights) -> crocoddyl.CostModelAbstract:
-    """Return the cost of the hand's position, l_arm of eq. 17; rows are the world's x, y, z."""
+    """Return the cost of the hand's position, l_arm of Paper B, eq. 17; rows are the world's axes."""
     frame = model.frame("hand")
     residual = crocoddyl.ResidualModelFrameTranslation(model.state, frame, np.zeros(3), model.nu)
     return _cost(model, residual, np.array(weights.hand))
 
 
 def hand_rotation(model: Model, weights: Weights) -> crocoddyl.CostModelAbstract:
-    """Return the cost of the hand's orientation, l_arm of eq. 17."""
+    """Return the cost of the hand's orientation, l_arm of Paper B, eq. 17."""
     frame = model.frame("hand")
     residual = crocoddyl.ResidualModelFrameRotation(model.state, frame, np.eye(3), model.nu)
     return _cost(model, residual, np.full(3, weights.hand_rotation))

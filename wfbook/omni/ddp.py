@@ -1,4 +1,4 @@
-"""Chapter 11: differential dynamic programming in plain NumPy, for small systems (Paper B, eqs 16–21).
+"""Chapter 11: differential dynamic programming in plain NumPy, for small systems (Paper B, eqs 16, 18–21).
 
 One iteration goes backward through time and then forward. Backward, the cost of the best way on from each
 state is a parabola about the present trajectory: :func:`expansion` is eq. 20, :func:`gains` eq. 21. Forward,
@@ -42,7 +42,7 @@ class System(Protocol):
 
 @dataclass(frozen=True)
 class Expansion:
-    """Eq. 20 at one step: what a change of state and control does to the cost from here to the end.
+    """Paper B, eq. 20, at one step: what a change of state and control does to the cost to go.
 
     Attributes:
         s: ``(n,)`` gradient in the state.
@@ -113,7 +113,7 @@ def rollout(system: System, start: np.ndarray, controls: np.ndarray) -> np.ndarr
 
 
 def total_cost(system: System, states: np.ndarray, controls: np.ndarray) -> float:
-    """Return what Paper B, eq. 16 minimises: the sum over all steps, and the end."""
+    """Return what Paper B, eq. 16, minimises: the sum over all steps, and the end."""
     running = sum(system.cost(s, u) for s, u in zip(states[:-1], controls, strict=True))
     return float(running + system.final_cost(states[-1]))
 
@@ -142,8 +142,10 @@ def expansion(system: System, s: np.ndarray, u: np.ndarray, V_s: np.ndarray, V_s
 def gains(Q: Expansion, damping: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Return feed-forward ``k (m,)`` and feedback ``K (m, n)`` of ``δu = k + K δs`` (Paper B, eq. 21).
 
-    ``k = −Q_uu⁻¹ Q_u`` and ``K = −Q_uu⁻¹ Q_us``. The paper multiplies from the other side and has ``Q_su``:
-    these shapes fit for one control and one state only. Crocoddyl's ``K`` has the opposite sign.
+    ``k = −Q_uu⁻¹ Q_u`` and ``K = −Q_uu⁻¹ Q_us``. Crocoddyl's ``K`` has the opposite sign.
+
+    Not as printed: the paper multiplies from the other side and has ``Q_su``. These shapes fit for one
+    control and one state only.
 
     Args:
         Q: of this step.
@@ -159,9 +161,10 @@ def gains(Q: Expansion, damping: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
 
 
 def value(Q: Expansion, k: np.ndarray, K: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return gradient ``(n,)`` and Hessian ``(n, n)`` of the value function before a step (after eq. 21).
+    """Return gradient ``(n,)`` and Hessian ``(n, n)`` of the value function before a step (Paper B, eq. 18).
 
-    The paper's ``Q_s − Kᵀ Q_uu k`` and ``Q_ss − Kᵀ Q_uu K`` hold for undamped gains alone, these for any.
+    After eq. 21 the paper has ``Q_s − Kᵀ Q_uu k`` and ``Q_ss − Kᵀ Q_uu K``, which hold for undamped gains
+    alone; these hold for any.
     """
     V_s = Q.s + K.T @ (Q.uu @ k + Q.u) + Q.su @ k
     V_ss = Q.ss + K.T @ Q.uu @ K + Q.su @ K + K.T @ Q.su.T
@@ -192,6 +195,29 @@ def backward(
         curvature += float(k @ Q.uu @ k)
         largest = max(largest, float(np.abs(Q.u).max()))
     return np.array(feedforward[::-1]), np.array(feedback[::-1]), slope, curvature, largest
+
+
+def parabolas(
+    system: System, states: np.ndarray, controls: np.ndarray, damping: float = 0.0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return what :func:`backward` takes the value function for, near each state of a trajectory.
+
+    Returns:
+        ``V (N + 1,)``, what the trajectory itself still costs from there on, ``V_s (N + 1, n)`` and
+        ``V_ss (N + 1, n, n)``.
+
+    Raises:
+        numpy.linalg.LinAlgError: as :func:`backward`.
+    """
+    left = [system.final_cost(states[-1])]
+    gradient, hessian = ([found] for found in system.final_derivatives(states[-1]))
+    for s, u in zip(states[-2::-1], controls[::-1], strict=True):
+        Q = expansion(system, s, u, gradient[-1], hessian[-1])
+        V_s, V_ss = value(Q, *gains(Q, damping))
+        left.append(left[-1] + system.cost(s, u))
+        gradient.append(V_s)
+        hessian.append(V_ss)
+    return np.array(left[::-1]), np.array(gradient[::-1]), np.array(hessian[::-1])
 
 
 def forward(
@@ -269,7 +295,7 @@ def iterations(
 def solve(
     system: System, start: np.ndarray, controls: np.ndarray, tolerance: float = 1e-9, most: int = 200
 ) -> Solution:
-    """Iterate until nothing is left to gain (Paper B, eqs 16 to 21).
+    """Iterate until nothing is left to gain (Paper B, eqs 16 and 18 to 21).
 
     Args:
         system: to be controlled.

@@ -1,7 +1,6 @@
-"""Chapter 10: how the robot accelerates while its wheels keep to the ground (Paper B, eqs 1 to 5).
+"""Chapter 10: how the robot accelerates while its wheels keep to the ground (Paper B, eqs 2 to 5).
 
-The configuration is that of eq. 1: trunk, legs, arm. What the paper calls the centre of mass there, ``r_WB``,
-is the origin of the trunk's frame.
+The configuration of eq. 1, trunk, legs and arm, is that of :class:`wfbook.omni.robot.OmniDynamics`.
 
 Eq. 4 asks for accelerations and contact forces at once. It has one answer if no contact row follows from the
 others. The legs have no abduction, so four wheels that are each held in all three directions are too much:
@@ -103,6 +102,9 @@ def touch(dynamics: OmniDynamics, leg: str) -> Touch:
 def contact_rows(dynamics: OmniDynamics, rows: dict[str, str] = ROWS) -> tuple[np.ndarray, np.ndarray]:
     """Return Jacobian ``J_c (n_c, 29)`` and drift ``J̇_c q̇ (n_c,)`` of the contacts (Paper B, eq. 3).
 
+    Not as printed: the paper says that it holds along the normal. It has to hold along every direction in
+    which the contact does not slip.
+
     Args:
         dynamics: updated.
         rows: of each leg in contact, by its name, which directions are held.
@@ -131,10 +133,10 @@ def constrained(
     drift: np.ndarray,
     damping: float = 0.0,
 ) -> Constrained:
-    """Solve Paper B, eq. 4, for accelerations and contact forces.
+    """Solve Paper B, eqs 2, 4 and 5, for accelerations and contact forces.
 
-    By elimination: ``(J M⁻¹ Jᵀ + damping) f = −J̇ q̇ − J M⁻¹ (Sᵀ u − h)``, then ``q̈`` from eq. 2. Without
-    contacts it is Paper B, eq. 5.
+    Of eq. 4 by elimination: ``(J M⁻¹ Jᵀ + damping) f = −J̇ q̇ − J M⁻¹ (Sᵀ u − h)``, then ``q̈`` from eq. 2.
+    Without contacts it is eq. 5.
 
     Args:
         M: ``(29, 29)`` mass matrix.
@@ -169,7 +171,7 @@ def forward_dynamics(
     damping: float = 0.0,
     locked: Sequence[int] = (),
 ) -> Constrained:
-    """Return how the robot accelerates at a state of MuJoCo's (Paper B, eq. 4).
+    """Return how the robot accelerates at a state of MuJoCo's (Paper B, eqs 4 and 5).
 
     Args:
         dynamics: of the robot; updated here.

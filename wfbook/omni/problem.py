@@ -1,4 +1,4 @@
-"""Chapter 11: whole-body motion as one optimal control problem, in Crocoddyl (Paper B, eqs 16 to 21).
+"""Chapter 11: whole-body motion as one optimal control problem, in Crocoddyl (Paper B, eqs 4, 16, 17, 21).
 
 The dynamics are eq. 4 with steering, wheels and gripper locked: 41 numbers of state and 14 torques. A wheel's
 contact is held where eq. 4 keeps one answer: of two diagonal wheels in all three directions, of the others in
@@ -23,7 +23,7 @@ import numpy as np
 import pinocchio as pin
 
 from wfbook.modes import LEGS
-from wfbook.omni import costs
+from wfbook.omni import costs, touching
 from wfbook.omni.costs import TERMS, Model, Weights
 from wfbook.omni.locked import (
     NQ_LOCKED,
@@ -46,7 +46,7 @@ _UP = np.tile([0.0, 0.0, 1.0], (4, 1))
 
 
 class OptimalControl:
-    """Eq. 16 over a horizon: dynamics, costs, solver, and the last solution to start the next from.
+    """Paper B, eqs 16 and 17, over a horizon: dynamics, costs, solver, and the last solution.
 
     Args:
         nodes: time steps, N of eq. 16.
@@ -56,6 +56,7 @@ class OptimalControl:
         mu: friction coefficient.
         without: terms of eq. 17 to leave out, of :data:`wfbook.omni.costs.TERMS`, ``contact`` or ``leg``.
         solver: ``"FDDP"``, or ``"BoxFDDP"`` that also keeps torques within the motors' limits.
+        also: contacts beside the wheels', of :data:`.touching.ALSO`.
 
     Attributes:
         model: Pinocchio's; the frames of its contacts are edited by :meth:`place_contacts`.
@@ -64,6 +65,8 @@ class OptimalControl:
         xs: ``(N+1)`` states ``(41,)`` of the last solution.
         us: ``(N)`` torques ``(14,)``.
         payload: mass in the hand that it reckons with.
+        stances: which wheels stand in each node.
+        asked: ``(N+1)`` where the hand is asked to be, ``(3,)``.
 
     Raises:
         ValueError: an unknown mode, term or solver.
@@ -78,6 +81,7 @@ class OptimalControl:
         mu: float = FRICTION,
         without: Iterable[str] = (),
         solver: str = "FDDP",
+        also: Iterable[str] = (),
     ) -> None:
         if mode not in MODES:
             raise ValueError(f"mode: {mode!r} is none of {', '.join(MODES)}")
@@ -87,7 +91,7 @@ class OptimalControl:
         unknown = without - {*TERMS, "contact", "leg"}
         if unknown:
             raise ValueError(f"without: {', '.join(sorted(unknown))}: no term of eq. 17")
-        self.nodes, self.dt, self.mode, self.mu = nodes, dt, mode, mu
+        self.nodes, self.dt, self.mode, self.mu, self.also = nodes, dt, mode, mu, tuple(also)
         self.weights = Weights() if weights is None else weights
         self.model = contact_model()
         wrist = self.model.frames[self.model.getFrameId("hand")].parentJoint
@@ -102,14 +106,16 @@ class OptimalControl:
         stages = [self._action(dt, 1.0, without) for _ in range(nodes)]
         terminal = self._action(0.0, self.weights.terminal, without)
         self.actions = [*stages, terminal]
-        self._stances: list[tuple[bool, ...] | None] = [None] * (nodes + 1)
+        self.stances: list[tuple[bool, ...] | None] = [None] * (nodes + 1)
+        self.asked: list[np.ndarray] = []
         start = nominal_state()
         self.problem = crocoddyl.ShootingProblem(start, stages, terminal)
         datas = [*self.problem.runningDatas, self.problem.terminalData]
         contacts = [data.differential.multibody.contacts.contacts.todict() for data in datas]
         self._contacts = {name: [node[name] for node in contacts] for name in contacts[0]}
         self._costs = [action.differential.costs.costs.todict() for action in self.actions]
-        self.problem.nthreads = 1  # on a busy machine threads wait for each other at every pass
+        if self.problem.nthreads != 1:  # on a busy machine threads wait for each other at every pass
+            self.problem.nthreads = 1
         self.solver = {"FDDP": crocoddyl.SolverFDDP, "BoxFDDP": crocoddyl.SolverBoxFDDP}[solver](self.problem)
         self.solver.th_stop = 1e-4
         self.stand([(True,) * 4] * (nodes + 1))
@@ -118,7 +124,7 @@ class OptimalControl:
         self.hold(start)
 
     def _action(self, dt: float, scale: float, without: set[str]) -> crocoddyl.ActionModelAbstract:
-        """Return a node: eq. 4 with every contact it may have, and eq. 17, ``scale`` times."""
+        """Return a node of Paper B, eqs 4 and 17: every contact it may have, and the cost ``scale`` times."""
         contacts = crocoddyl.ContactModelMultiple(self.state, self.actuation.nu)
         total = crocoddyl.CostModelSum(self.state, self.actuation.nu)
         gains = np.array([0.0, _SETTLING if self.mode == "legged" else 0.0])
@@ -141,6 +147,13 @@ class OptimalControl:
             if "leg" not in without:
                 cost = costs.leg(self._terms, f"{leg}_axle", self.weights)
                 total.addCost(f"{leg}_swing", cost, scale, False)
+        for also in self.also:
+            for name, touched in touching.contacts(also, self.state, self.actuation.nu, gains).items():
+                contacts.addContact(name, touched)
+        if "hand" in self.also and "contact" not in without and dt > 0.0:
+            cost = costs.contact(self._terms, "hand", self.mu, self.weights)
+            cost.residual.reference = costs.pyramid(self.mu, touching.WALL)
+            total.addCost("hand_force", cost, self.weights.contact)
         for name, (make, weight) in TERMS.items():
             if name not in without and not (name == "effort" and dt == 0.0):
                 factor = 1.0 if weight is None else getattr(self.weights, weight)
@@ -165,11 +178,11 @@ class OptimalControl:
         """
         for node, stance in enumerate(stances):
             stance = tuple(bool(stands) for stands in stance)
-            if stance == self._stances[node]:
+            if stance == self.stances[node]:
                 continue
             if not any(stance) or (self.mode == "wheeled" and not all(stance)):
                 raise ValueError(f"stances[{node}]: {stance}: too few wheels stand for {self.mode} mode")
-            self._stances[node] = stance
+            self.stances[node] = stance
             held, dynamics = held_rows(stance), self.actions[node].differential
             terms = self._costs[node]
             for leg, stands in zip(LEGS, stance, strict=True):
@@ -187,6 +200,7 @@ class OptimalControl:
         Args:
             targets: ``nodes + 1``.
         """
+        self.asked = [target.hand for target in targets]
         for terms, target in zip(self._costs, targets, strict=True):
             reference = self.state.zero()
             reference[7:NQ_LOCKED] = target.posture
@@ -268,14 +282,14 @@ class OptimalControl:
         return bool(done)
 
     def feedback(self, node: int) -> np.ndarray:
-        """Return K ``(14, 40)`` of eq. 21 at a node: torque to add per deviation of the state.
+        """Return K ``(14, 40)`` of Paper B, eq. 21, at a node: torque to add per deviation of the state.
 
         Crocoddyl's own gain has the opposite sign.
         """
         return -np.array(self.solver.K[node])
 
     def follow(self, share: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return what is planned within the first time step, and the torques of eq. 21 near it.
+        """Return what is planned within the first time step, and the torques of Paper B, eq. 21, near it.
 
         Args:
             share: of the step that has passed, 0 to 1.
@@ -296,7 +310,7 @@ class OptimalControl:
         self.payload = mass
 
     def acceleration(self, x: np.ndarray, u: np.ndarray) -> np.ndarray:
-        """Return the acceleration ``(20,)`` of eq. 4."""
+        """Return the acceleration ``(20,)`` of Paper B, eq. 4."""
         dynamics, data = self.actions[0].differential, self.problem.runningDatas[0].differential
         dynamics.calc(data, x, u)
         return np.array(data.xout)
@@ -312,7 +326,16 @@ class OptimalControl:
         They are x rolling, y the axle, z the ground's normal, as :meth:`place_contacts` found them.
         """
         forces = np.zeros((4, 3))
-        for leg, rows in held_rows(self._stances[node]).items():
+        for leg, rows in held_rows(self.stances[node]).items():
             placement = self.model.frames[self.model.getFrameId(f"{leg}_xyz")].placement
             forces[LEGS.index(leg)] = placement.rotation.T @ self._contacts[f"{leg}_{rows}"][node].fext.linear
         return forces
+
+    def others(self, node: int) -> dict[str, np.ndarray]:
+        """Return what the last solution expects at a node from the contacts beside the wheels'.
+
+        Returns:
+            By name, ``(6,)`` force and moment in the contact's axes; the hand's are the world's.
+        """
+        names = [name for name in self._contacts if name == "hand" or name.endswith("_axle")]
+        return {name: np.array(self._contacts[name][node].f.vector) for name in names}

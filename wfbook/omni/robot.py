@@ -300,17 +300,20 @@ def locked_model(qpos: np.ndarray | None = None) -> pin.Model:
 
 
 class OmniDynamics(FloatingBase):
-    """Mass matrix, bias forces and kinematics at one state, from Pinocchio.
+    """Mass matrix, bias forces and kinematics at one state, from Pinocchio (Paper B, eqs 1 and 2).
 
     Call :meth:`update`, then read the attributes and ask for frames. Joints are in MuJoCo's order, the
     trunk's velocity (linear, then angular) is in its own frame, as Pinocchio has it.
+
+    Not as printed, eq. 1: the paper calls ``r_WB`` the centre of mass. In a configuration it can only be the
+    origin of the trunk's frame.
 
     Attributes:
         model, data: Pinocchio's.
         mass: of the whole robot.
         velocity: ``(29,)`` generalised velocity.
         M: ``(29, 29)`` mass matrix.
-        h: ``(29,)`` Coriolis, centrifugal and gravity forces (Paper B, eq. 2).
+        h: ``(29,)`` Coriolis, centrifugal and gravity forces.
         com: ``(3,)`` centre of mass.
         R_wb: ``(3, 3)`` the trunk's orientation.
     """

@@ -1,6 +1,6 @@
-"""Chapter 10: what all contacts can do together: equilibrium, zero-moment point, areas of support.
+"""Chapter 10: what all contacts can do together: balance and areas of support (Paper B, eqs 10 and 11).
 
-Each contact has a wrench in its own cone (Paper B, eq. 10); together they must balance what acts on the robot
+Each contact has a wrench in its own cone (eq. 10); together they must balance what acts on the robot
 (eq. 11). What is left open is a polyhedron in as many dimensions as there are components of wrenches. The
 areas of support are its shadows on a plane, found by asking a linear program for its outermost point, one
 direction after the other.

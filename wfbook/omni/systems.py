@@ -160,3 +160,58 @@ class Unicycle(Weighted):
         f_s = np.eye(3)
         f_s[:2, 2] = self.dt * u[0] * np.array([-sin, cos])
         return f_s, self.dt * np.array([[cos, 0.0], [sin, 0.0], [0.0, 1.0]])
+
+
+@dataclass(frozen=True)
+class Honey:
+    """A pendulum in honey: so much drag that it has no swing, and one number of state, its angle.
+
+    ``θ' = θ + dt (u − m g l sin θ) / drag``. Its value function can be drawn, and found on a grid. It is paid
+    for where it points (upright, at ±π, costs nothing) and for torque.
+
+    Attributes:
+        drag: of the honey, N m s/rad.
+        weight: m g l, N m.
+        point: cost of hanging for a second, halved.
+        control: of torque squared for a second.
+        final: of hanging at the end, halved.
+        dt: duration of a step.
+    """
+
+    drag: float = 2.0
+    weight: float = 4.0
+    point: float = 1.0
+    control: float = 0.1
+    final: float = 10.0
+    dt: float = 0.05
+
+    def step(self, s: np.ndarray, u: np.ndarray) -> np.ndarray:
+        """Return the next state, ``(1,)``."""
+        return s + self.dt * (u - self.weight * np.sin(s)) / self.drag
+
+    def step_derivatives(self, s: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return ``f_s (1, 1)`` and ``f_u (1, 1)``."""
+        share = self.dt / self.drag
+        return np.array([[1.0 - share * self.weight * np.cos(s[0])]]), np.array([[share]])
+
+    def cost(self, s: np.ndarray, u: np.ndarray) -> float:
+        """Return the cost of a step."""
+        return float(self.dt * (self.point * (1.0 + np.cos(s[0])) + 0.5 * self.control * u[0] ** 2))
+
+    def cost_derivatives(self, s: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return ``l_s, l_u, l_ss, l_su, l_uu``."""
+        return (
+            -self.dt * self.point * np.sin(s),
+            self.dt * self.control * u,
+            np.array([[-self.dt * self.point * np.cos(s[0])]]),
+            np.zeros((1, 1)),
+            np.array([[self.dt * self.control]]),
+        )
+
+    def final_cost(self, s: np.ndarray) -> float:
+        """Return the cost of where it ends."""
+        return float(self.final * (1.0 + np.cos(s[0])))
+
+    def final_derivatives(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return gradient and Hessian of the final cost."""
+        return -self.final * np.sin(s), np.array([[-self.final * np.cos(s[0])]])

@@ -1,4 +1,4 @@
-"""Chapter 9: how four steered, driven wheels move a body (Paper B, eqs 12–15 and the appendix).
+"""Chapter 9: how four steered, driven wheels move a body (Paper B, eqs 12–15 and 22).
 
 A twist is what the body does: ``(v_x, v_y, omega)``, the velocity of the middle of its wheels in the body's
 own axes and its yaw rate. A wheel stands at ``positions[i]`` in the same axes, is steered by an angle from
@@ -96,9 +96,10 @@ def wrap(angles: np.ndarray | float) -> np.ndarray:
 
 
 def steering_directions(velocities: np.ndarray) -> np.ndarray:
-    """Return the directions ``(n,)`` of velocities ``(n, 2)`` (Paper B, eq. 13, there called optimal).
+    """Return the directions ``(n,)`` of velocities ``(n, 2)`` (Paper B, eq. 13).
 
-    They are the desired angles of eq. 14: what is optimal is found there.
+    Not as printed: the paper calls them optimal. They are the desired angles of eq. 14, which finds the
+    optimal.
     """
     return np.arctan2(velocities[:, 1], velocities[:, 0])
 
@@ -111,10 +112,11 @@ def shorter_turns(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return by how much to turn each wheel, forward or backward, whichever is nearer (Paper B, eq. 14).
 
-    As printed, eq. 14 compares angles without wrapping them: 179° and -179° are 358° apart, so it reverses
-    a wheel that is 2° from where it should be. Here differences are wrapped first. And a wheel at a quarter
-    turn from its direction could change its mind with every bit of noise; so one that goes backward or
-    forward already stays with it until that costs a quarter turn *and* ``hysteresis``.
+    Not as printed: the paper compares angles without wrapping them: 179° and -179° are 358° apart, so it
+    reverses a wheel that is 2° from where it should be. Here differences are wrapped first.
+
+    A wheel at a quarter turn from its direction could change its mind with every bit of noise; so one that
+    goes backward or forward already stays with it until that costs a quarter turn *and* ``hysteresis``.
 
     Args:
         desired: ``(n,)`` directions of the wheels' velocities.
@@ -162,7 +164,7 @@ def wheel_command(
     hysteresis: float = HYSTERESIS,
     rest_speed: float = REST_SPEED,
 ) -> WheelCommand:
-    """Return steering angles and speeds that give the body a twist (Paper B, eq. 15, from eqs 12–14).
+    """Return steering angles and speeds that give the body a twist (Paper B, eq. 15).
 
     Every wheel gets exactly the velocity that the twist has at its place, whatever the twist. A wheel that
     is to stand holds its angle: eq. 13 has no direction for it, and atan2(0, 0) = 0 would swing it straight
@@ -193,6 +195,9 @@ def constraint_matrix(steering: np.ndarray, positions: np.ndarray) -> np.ndarray
 
     ``S @ twist`` is ``[0, speed]`` where nothing skids and all wheels roll. The upper half are the sideways
     rows.
+
+    Not as printed: the paper's twist is ``(ω, v)`` above the matrix and ``(v, ω)`` beside it. Here it is
+    ``(v_x, v_y, ω)`` throughout.
     """
     cos, sin = np.cos(steering), np.sin(steering)
     along, across = np.column_stack([cos, sin]), np.column_stack([-sin, cos])

@@ -114,7 +114,10 @@ def line_contact(mu: float, width: float, rolling: float = 0.0) -> WrenchCone:
     All that a line can do its two ends can do. With the half width ``a``, the left end (+y) presses with
     ``(fz + τx / a) / 2`` and pushes along with ``(fx − τz / a) / 2``; the right end with the other signs.
     Each has a friction pyramid of its own, hence rows in which force and moment are coupled. Across, only the
-    sum matters. The moment about the axle, ``τy``, has no lever on the line.
+    sum matters.
+
+    Not as printed, eq. 7: the moment that the paper leaves free is the one about the axle, ``τy``, which has
+    no lever on the line: it is none at all. (The paper's x is lateral and its y rolls; that can't be meant.)
 
     Args:
         mu: friction coefficient.
@@ -173,8 +176,10 @@ def surface_contact(mu: float, length: float, width: float) -> WrenchCone:
 def decoupled(mu: float, levers: Sequence[float | None]) -> WrenchCone:
     """Return Paper B, eq. 7, mended: friction rows with μ at ``fz``, moments bounded by levers of ``fz``.
 
-    A constant bound on a moment is no cone: it would let a wheel that is hardly pressed twist as hard as one
-    that carries the robot. The levers of a line are ``w/2``, 0 and ``μ w/2``. Each row is true of the
+    Not as printed: the friction rows say ``|fx| ≤ fz / μ``. And a constant bound on a moment is no cone: it
+    would let a wheel that is hardly pressed twist as hard as one that carries the robot.
+
+    The levers of a line are ``w/2``, 0 and ``μ w/2``. Each row is true of the
     contact, but all together admit more than :func:`line_contact`: full push and full twist at once.
 
     Args:
@@ -211,8 +216,8 @@ def printed(mu: float, largest: Sequence[float], smallest: Sequence[float]) -> W
 def penalty(residual: np.ndarray) -> np.ndarray:
     """Return ``½ Σ max(r, 0)²`` (Paper B, eq. 9, row by row): ``(...)`` for residuals ``(..., m)``.
 
-    The paper writes it for the whole vector: ``½ rᵀr`` if ``r > 0``. Taken like that, one broken row would
-    charge for all rows that hold as well, and more the better they hold.
+    Not as printed: the paper writes it for the whole vector, ``½ rᵀr`` if ``r > 0``. Taken like that, one
+    broken row would charge for all rows that hold as well, and more the better they hold.
     """
     over = np.maximum(residual, 0.0)
     return 0.5 * (over * over).sum(axis=-1)

@@ -32,6 +32,7 @@ _TELLING = (
     "__main__.py",
     "arguments.py",
     "book",
+    "classroom",
     "quoted.py",
     "report.py",
     "results.py",

@@ -1,4 +1,4 @@
-"""The paper's own formulation: implications as big-M (Paper A, eqs 6–29), given to SCIP as it is.
+"""The paper's own formulation: implications as big-M (Paper A, eqs 2–7 and 10–29), on SCIP as it is.
 
 Kept for teaching and for the benchmark. It has the same feasible plans as :mod:`.tight`, but between
 the binaries its constraints say nearly nothing: at ``S = ½`` a leg may be anywhere and push at the
@@ -106,7 +106,7 @@ def build(problem: Problem) -> Program:
 
 
 def implies(condition: Any, expression: Any, big: Any) -> list[Any]:
-    """State ``condition = 1 ⟹ expression = 0`` in big-M format.
+    """State ``condition = 1 ⟹ expression = 0`` in big-M format, as Paper A, eq. 18 and all others need it.
 
     Args:
         condition: one at binaries where the implication holds, and zero or less elsewhere.
@@ -122,7 +122,7 @@ def implies_below(condition: Any, expression: Any, big: Any) -> list[Any]:
 
 
 def _gait(program: Program, dynamics: Dynamics) -> None:
-    """State eqs 13, 14, 16, 17 and which legs may swing together and when."""
+    """State Paper A, eqs 16 and 17, and which legs may swing together and when."""
     problem, S = program.problem, program.S
     admissible = {frozenset(p) for p in problem.patterns}
     for size in range(1, problem.legs + 1):
@@ -141,10 +141,10 @@ def _gait(program: Program, dynamics: Dynamics) -> None:
 
 
 def _union(program: Program, dynamics: Dynamics) -> None:
-    """State eq. 25, and that a wheel passes its regions in one direction within a slot.
+    """State Paper A, eq. 25, and that a wheel passes its regions in one direction within a slot.
 
-    Equation 25 is an equality here, for the force at a knot needs one region; a wheel that touches down
-    does so where D says.
+    Not as printed: it is an equality here. Two regions share an edge, and the force at a knot needs one of
+    them. A wheel that touches down does so where D says.
     """
     problem, rho = program.problem, program.problem.knots_per_slot
     for members in problem.ground.groups:
@@ -167,7 +167,7 @@ def _union(program: Program, dynamics: Dynamics) -> None:
 
 
 def _motion(program: Program, dynamics: Dynamics, grid: Grid) -> None:
-    """State eqs 2–6 and 19–21: which knots follow the spline, stay, or roll."""
+    """State Paper A, eqs 2–6 and 18–21: which knots follow the spline, stay, or roll."""
     problem, p, x, v = program.problem, program.p, program.x, program.v
     K, L, rho = problem.knots, problem.legs, problem.knots_per_slot
     swing, walks, rolls = (grid.spread @ m.T for m in (program.S, dynamics.carrying("foot"), program.wheel))
@@ -218,7 +218,7 @@ def _heights(problem: Problem) -> tuple[float, float]:
 
 
 def _regions(program: Program, dynamics: Dynamics, grid: Grid) -> None:
-    """State eqs 22–24: a foot is on its region where slots end, a wheel on one of its group at all knots."""
+    """State Paper A, eqs 18 and 22–24: feet are on regions where slots end, wheels in groups at all knots."""
     problem, ground, p = program.problem, program.problem.ground, program.p
     rho, rise = problem.knots_per_slot, problem.robot.swing_height
     places = Places.of(problem, MotionBounds.of(problem))
@@ -247,7 +247,7 @@ def _regions(program: Program, dynamics: Dynamics, grid: Grid) -> None:
 
 
 def _forces(program: Program, dynamics: Dynamics, grid: Grid) -> None:
-    """State eqs 7 and 26–29, in the basis of the region that a contact is on when the interval ends."""
+    """State Paper A, eqs 7, 18 and 26–29, in the basis of the region below when the interval ends."""
     problem, force, limit = program.problem, program.force, program.problem.limits.force
     swing, walks = (grid.spread @ m.T for m in (program.S, dynamics.carrying("foot")))
     surfaces = problem.ground.surfaces
@@ -283,7 +283,7 @@ def _largest_force(surface: Surface, problem: Problem) -> np.ndarray:
 
 
 def _centroid(program: Program, grid: Grid) -> None:
-    """State eqs 10–15, with ``s₀`` and without ``n = N_l``."""
+    """State Paper A, eqs 10–15, with ``s₀`` and without ``n = N_l``."""
     problem = program.problem
     L, J, K = problem.legs, problem.slots, problem.knots
     most = max(len(p) for p in problem.patterns)

@@ -158,7 +158,7 @@ class Contacts:
         return {"pattern": self.pattern} | {k: v for k, v in named.items() if k in own or v.id not in stances}
 
     def _flow(self) -> None:
-        """State eqs 16 and 17: a leg stands only where and on what it stood or landed the slot before."""
+        """State Paper A, eqs 16 and 17: a leg stands where and on what it stood or landed before."""
         problem = self.problem
         self.rows.append(self.feet + self.rolling + self.S == 1)
         own = {v.id: v for v in self.discrete().values() if v is not self.pattern}
@@ -179,7 +179,7 @@ class Contacts:
             self.rows.append(cp.sum(self.feet[:, -1]) >= 1)
 
     def _pass(self) -> None:
-        """State where rolling wheels are: in one region of their group, without turning back in a slot."""
+        """State Paper A, eqs 23–25: a rolling wheel is in one region of its group, and does not turn back."""
         ground = self.problem.ground
         for g, members in self.groups.items():
             if len(members) == 1 or not self.problem.wheels:
@@ -201,9 +201,9 @@ class Contacts:
 
     @property
     def sizes(self) -> Any:
-        """``(N, J)`` expression whose row n is 1 where n legs swing.
+        """``(N, J)`` expression whose row n is 1 where n legs swing (Paper A, eqs 13 and 14).
 
-        The paper's auxiliary s of eqs 13 and 14, with the s₀ that it lacks.
+        The paper's auxiliary s, with the s₀ that it lacks.
         """
         sizes = np.array([len(p) for p in self.problem.patterns])
         return np.array([sizes == n for n in range(sizes.max() + 1)], float) @ self.pattern

@@ -230,13 +230,14 @@ class Polisher:
                 entries.append(np.broadcast_to(what, where.shape).ravel()),
             )
 
+        torque = contact_torque(lever, force)
         for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
             for axis in range(3):
                 put(i, alpha[axis], inertia[i, axis])
             put(i, s[i], -1.0)
             put(i, F[k], -lever[j]), put(i, r[j], -force[k])
             put(i, F[j], lever[k]), put(i, r[k], force[j])
-            right.append((lever[k] * force[j] - lever[j] * force[k]).sum(axis=1))
+            right.append(-torque[i].sum(axis=1))
         equal = sparse.csc_matrix(
             (np.concatenate(entries), (np.concatenate(rows), np.concatenate(columns))), shape=(3 * K, n)
         )

@@ -23,8 +23,8 @@ OPTIONAL = {
     "angular bounds": "the robot can't turn over, whatever torque its forces make",
     "centroid": "the centre of mass may stray from the middle of the contacts",
 }
-"""Groups of constraints that a problem may do without, and what is true then (Paper A, eqs 26 and 27; 28
-and 29; 30; 8 and 9 with their terms of eq. 33; 10 to 15, which serve a term of eq. 33 only)."""
+"""Groups of constraints that a problem may do without, and what is true then (Paper A, eqs 26
+and 27; eqs 28 and 29; eq. 30; eqs 8 and 9 with their terms of eq. 33; eqs 10 to 15, of a term of it)."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,11 @@ class Weights:
     + Σ_k (acceleration ‖a_k‖² + force Σ_l ‖F_kl‖² + bounds Σ_l,i (U⁺ + U⁻)_kli / (m g)
     + centroid ‖x_{k+1} − c_k‖²) + swing Σ_lj (j + 1) S_lj`` with ``j`` from 0. The goal's and the
     centroid's norms are horizontal; a problem that begins in motion counts ``j`` from where the whole
-    motion began. The terms in angle, angular rate and height are not in the
-    paper: without them rotation rings at ± 6 rad/s and the levers in U make the robot crouch.
+    motion began.
+
+    Not as printed, eq. 33: it has no terms in angle, angular rate and height. Without them rotation rings at
+    ± 6 rad/s and the levers in U make the robot crouch. The text below it charges for ``λ̈``; it is λ that is
+    paid for.
     """
 
     goal: float = 10.0

@@ -1,4 +1,4 @@
-"""The mixed-integer program's common part: variables, cost, dynamics and reach (Paper A, eqs 1–9, 30–33).
+"""The program's common part: variables, cost, dynamics, reach (Paper A, eqs 1–6, 8, 9, 30–33).
 
 Forces are in body weights, ``F = λ / (m g)``, so that levers and forces are numbers of one size;
 components come first, ``force[i]`` of shape ``(K, L)``. The two formulations (:mod:`.tight` and
@@ -72,7 +72,7 @@ class Program:
 
 @dataclass(frozen=True)
 class Grid:
-    """Constant matrices between slots and knots.
+    """Constant matrices between slots and knots; the spline of Paper A, eqs 2–6, at the knots.
 
     Attributes:
         spread: ``(K, J)``: what holds for a slot, for each of its intervals.
@@ -114,7 +114,7 @@ class Grid:
 def common(
     problem: Problem, S: Any, wheel: Any, force: list[Any], friction: list[Any], per_leg: bool
 ) -> Program:
-    """State what both formulations share: dynamics, torque bounds, reach, start, end and cost.
+    """State what both formulations share: dynamics, reach, ends and cost (Paper A, eqs 1, 8, 9, 30, 31).
 
     Args:
         problem: what is asked.
@@ -167,7 +167,7 @@ def common(
 
 
 def bound(program: Program, problem: Problem) -> None:
-    """State where a program starts and ends, how far its legs reach and how fast it may be (eq. 30).
+    """State where a program starts and ends, how far its legs reach and how fast it may be (Paper A, eq. 30).
 
     The first word of a group's name says what it is, the second which of its kind.
 
@@ -228,7 +228,7 @@ def _vectors(K: int) -> list[tuple[str, int]]:
 
 
 def above_squares(u: Any, pair: tuple[Any, Any], per_leg: bool) -> list[Any]:
-    """State ``u ≥ Σ pair²`` as second-order cones (eq. 9): ``‖(2 z, u − 1)‖ ≤ u + 1``."""
+    """State ``u ≥ Σ pair²`` as second-order cones (Paper A, eq. 9): ``‖(2 z, u − 1)‖ ≤ u + 1``."""
     if per_leg:
         flat = [cp.vec(z, order="C") for z in (2 * pair[0], 2 * pair[1], u - 1)]
         return [cp.SOC(cp.vec(u, order="C") + 1, cp.vstack(flat), axis=0)]
@@ -239,12 +239,12 @@ def above_squares(u: Any, pair: tuple[Any, Any], per_leg: bool) -> list[Any]:
 
 
 def motion_cost(program: Program) -> Any:
-    """State eqs 31–33 but for the bounds U± (see :class:`~.problem.Weights`)."""
+    """State Paper A, eqs 31–33, but for the bounds U± (see :class:`~.problem.Weights`)."""
     return sum(cost_terms(program).values())
 
 
 def cost_terms(program: Program) -> dict[str, Any]:
-    """State the terms of eqs 31–33 but for the bounds U±, by the name of their weight."""
+    """State the terms of Paper A, eqs 31–33, but for the bounds U±, by the name of their weight."""
     w, problem, K = program.problem.priced, program.problem, program.problem.knots
     rise = program.x[2] - problem.robot.height - program.ground
     goal = cp.hstack([program.x[i][K] - problem.goal[i] for i in range(2)])

@@ -96,7 +96,7 @@ def build(problem: Problem, bounds: MotionBounds) -> Relaxation:
 
 
 def _forces(contacts: Contacts, a: list[Any]) -> tuple[Any, list[Any]]:
-    """Bound the cost of force by its sum over legs; state eqs 1, 26 and 29 for that sum."""
+    """Bound the cost of force by its sum over legs; state Paper A, eqs 1, 26 and 29, for it."""
     problem, sizes = contacts.problem, contacts.sizes
     K, L = problem.knots, problem.legs
     spread = Grid.of(problem).spread
@@ -206,7 +206,7 @@ def _carrying(contacts: Contacts, end_effector: str, regions: list[int]) -> Any:
 
 
 def _heights(contacts: Contacts, shares: dict, z: Any) -> tuple[Any, list[Any]]:
-    """Bound the cost of heights on ground that is not one level plane; state eq. 30 vertically at slot ends.
+    """Bound the cost of heights on ground that is not one level plane; state Paper A, eq. 30, vertically.
 
     The mean height of the ground under the legs follows the splines between slot ends (eq. 5), but for
     legs that roll, which are given what slopes and speed allow. ``Σ_l r_z² ≥ L mean²``.
@@ -253,7 +253,7 @@ def _bumps(problem: Problem) -> np.ndarray:
 def _levers(
     contacts: Contacts, x: list[Any], places: list[Any], shares: dict, bounds: MotionBounds
 ) -> tuple[Any, list[Any]]:
-    """Bound the horizontal cost of levers and centroid; state eqs 19–22 and 30 at slot ends."""
+    """Bound the horizontal cost of levers and centroid; state Paper A, eqs 19–22 and 30."""
     problem, S, sizes = contacts.problem, contacts.S, contacts.sizes
     J, K, L, rho = problem.slots, problem.knots, problem.legs, problem.knots_per_slot
     w, robot, limits = problem.priced, problem.body, problem.limits

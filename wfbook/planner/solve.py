@@ -27,7 +27,7 @@ def solve(
     time_limit: float = 60.0,
     progress: Callable[[Progress], None] | None = None,
 ) -> Plan:
-    """Solve the mixed-integer program (Paper A, eqs 1–33).
+    """Solve the mixed-integer program (Paper A, section II).
 
     Args:
         problem: what is asked.

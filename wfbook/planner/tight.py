@@ -109,7 +109,7 @@ def region_shares(contacts: Contacts, places: Places) -> tuple[dict[int, dict[in
 
 
 def _forces(contacts: Contacts, grid: Grid) -> tuple[list[Any], list[Any], list[Any]]:
-    """State eqs 7 and 26–29 for forces split by end effector and surface.
+    """State Paper A, eqs 7 and 26–29, for forces split by end effector and surface.
 
     Returns:
         Contact force and rolling friction in body weights, components ``(K, L)``, and constraints.
@@ -154,7 +154,11 @@ def _loaded(contacts: Contacts, grid: Grid, end_effector: str, regions: Sequence
 
 
 def _motion(program: Program, contacts: Contacts, grid: Grid) -> None:
-    """State eqs 2–6 and 19–21: steps and rolls, horizontally."""
+    """State Paper A, eqs 2–6 and 19–21: steps and rolls, horizontally.
+
+    Not as printed, eq. 6: it is no implication. A foot moves by steps, each zero unless its slot is a swing,
+    and the spline of a zero step is the stationary foot.
+    """
     problem, p, x, v = program.problem, program.p, program.x, program.v
     J, K, L, rho = problem.slots, problem.knots, problem.legs, problem.knots_per_slot
     step = [cp.Variable((L, J), name=f"step{i}") for i in range(2)]
@@ -185,7 +189,7 @@ def _motion(program: Program, contacts: Contacts, grid: Grid) -> None:
 
 
 def _regions(program: Program, contacts: Contacts, places: Places) -> None:
-    """State eqs 22–25: contacts lie inside regions where slots end, and rolling wheels always."""
+    """State Paper A, eqs 22–25: contacts lie inside regions where slots end, and rolling wheels always."""
     problem, ground, p = program.problem, program.problem.ground, program.p
     rho = problem.knots_per_slot
     shares, rows = region_shares(contacts, places)
@@ -232,7 +236,7 @@ def _inside(point: list[Any], region: int, inside: Any, places: Places, apex: fl
 
 
 def _heights(program: Program, contacts: Contacts, grid: Grid, places: Places) -> None:
-    """State the vertical spline (eq. 5) and how contacts rise and fall while they roll."""
+    """State the vertical spline (Paper A, eq. 5) and how contacts rise and fall while they roll."""
     problem, z, S = program.problem, program.p[2], program.S
     bump = problem.robot.swing_height * (grid.apex[1:] @ S.T)
     if problem.ground.level is not None:
@@ -252,7 +256,11 @@ def _heights(program: Program, contacts: Contacts, grid: Grid, places: Places) -
 
 
 def _centroid(program: Program, contacts: Contacts, grid: Grid) -> None:
-    """State eqs 10–15 relative to the centre of mass, split by the number of swinging legs."""
+    """State Paper A, eqs 10–15, relative to the centre of mass, split by the number of swinging legs.
+
+    Not as printed, eq. 11: the vertex of a swinging leg is zero relative to the centre of mass, not in the
+    world, where its M grows with the distance from the origin. (:mod:`.bigm` keeps that.)
+    """
     problem, sizes = program.problem, contacts.sizes
     K, L = problem.knots, problem.legs
     swing = grid.spread @ program.S.T

@@ -20,6 +20,7 @@ from wfbook.view.spans import SWINGING, plan_modes
 from wfbook.view.tracks import FPS
 
 if TYPE_CHECKING:
+    from wfbook.omni.tasks import Planned
     from wfbook.planner import Plan
     from wfbook.simulate import Run
 
@@ -145,6 +146,37 @@ def motion_of_tipping(tipping: Tipping) -> Motion:
         model=omni.ASSETS / "omni.xml",
         size=1.8,
         balance=balance_of(tipping, at),
+    )
+
+
+def motion_of_planned(planned: "Planned") -> Motion:
+    """Pose the robot of part II as an optimal control problem's solution has it, between nodes in proportion.
+
+    Forces are those of the node before; a wheel swings from the node on in which it no longer stands.
+    """
+    times = np.arange(planned.t[0], planned.t[-1] + 1e-9, 1.0 / FPS)
+
+    def between(values: np.ndarray) -> np.ndarray:
+        flat = values.reshape(len(values), -1)
+        columns = [np.interp(times, planned.t, column) for column in flat.T]
+        return np.stack(columns, axis=1).reshape(len(times), *values.shape[1:])
+
+    at = np.clip(np.searchsorted(planned.t, times + 1e-9, side="right") - 1, 0, len(planned.t) - 1)
+    qpos, wheel = between(planned.qpos), np.ones((len(times), len(LEGS)), int)
+    qpos[:, 3:7] /= np.linalg.norm(qpos[:, 3:7], axis=1, keepdims=True)
+    return Motion(
+        start=float(times[0]),
+        qpos=qpos,
+        end_effector=wheel,
+        modes=np.where(planned.stance[at], wheel, SWINGING),
+        contact=between(planned.p),
+        force=planned.contact_force[at],
+        planned_com=between(planned.com),
+        measured_com=None,
+        terrain=planned.terrain,
+        hand=between(planned.hand),
+        model=omni.ASSETS / "omni.xml",
+        size=1.8,
     )
 
 

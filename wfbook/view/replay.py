@@ -9,7 +9,7 @@ the legs stood and rolled, and the path of the centre of mass; of the robot of p
 Of a robot that is pushed over also the push, the zero-moment point and the area that it must not leave.
 The trunk of a robot that has to estimate where it is appears twice: where it is, and, light blue, where it
 believes to be. A plan can be replayed too, before any controller has seen it: then the robot is posed as the
-plan wants it.
+plan wants it. So can a solution of part II's optimal control problem.
 """
 
 import itertools
@@ -34,6 +34,7 @@ from wfbook.view.motion import (
     Motion,
     motion_of_driving,
     motion_of_plan,
+    motion_of_planned,
     motion_of_run,
     motion_of_standing,
     motion_of_tipping,
@@ -54,8 +55,11 @@ from wfbook.view.style import (
 from wfbook.view.tracks import Tracks
 
 if TYPE_CHECKING:
+    from wfbook.omni.tasks import Planned
     from wfbook.planner import Plan
     from wfbook.simulate import Run
+
+    Shown = Run | Plan | Planned | Standing | Driving | Tipping
 
 _MARGIN = 1.5
 _ARROW_LENGTH = 0.5
@@ -65,9 +69,7 @@ _STRAIGHT = 0.01
 """A track is drawn in straight pieces no further than this from where the wheel rolled."""
 
 
-def html(
-    motion: "Run | Plan | Standing | Driving | Tipping", title: str | None = None, beside: str = ""
-) -> str:
+def html(motion: "Shown", title: str | None = None, beside: str = "") -> str:
     """Return a self-contained page that replays a run or a plan.
 
     Args:
@@ -92,7 +94,9 @@ def html(
 
 
 def save(
-    motion: "Run | Plan | Standing | Driving | Tipping", path: str | os.PathLike, title: str | None = None
+    motion: "Shown",
+    path: str | os.PathLike,
+    title: str | None = None,
 ) -> None:
     """Write the page that replays a run or a plan.
 
@@ -112,7 +116,10 @@ class Replay:
     """
 
     def __init__(
-        self, motion: "Run | Plan | Standing | Driving | Tipping", height: int = 420, beside: str = ""
+        self,
+        motion: "Shown",
+        height: int = 420,
+        beside: str = "",
     ) -> None:
         self._html = frame(html(motion, beside=beside), height)
 
@@ -169,7 +176,7 @@ def commands(motion: Motion) -> list[dict]:
     return recorder.commands
 
 
-def _motion_of(motion: "Run | Plan | Standing | Driving | Tipping") -> Motion:
+def _motion_of(motion: "Shown") -> Motion:
     """Sample whatever moves."""
     if isinstance(motion, Standing):
         return motion_of_standing(motion)
@@ -177,7 +184,9 @@ def _motion_of(motion: "Run | Plan | Standing | Driving | Tipping") -> Motion:
         return motion_of_driving(motion)
     if isinstance(motion, Tipping):
         return motion_of_tipping(motion)
-    return motion_of_run(motion) if hasattr(motion, "qpos") else motion_of_plan(motion)
+    if not hasattr(motion, "qpos"):
+        return motion_of_plan(motion)
+    return motion_of_planned(motion) if hasattr(motion, "torques") else motion_of_run(motion)
 
 
 def _planned(motion: Motion) -> bool:

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
 
-from wfbook.friction import inner_coefficient, steepest_slope
+from wfbook.friction import inner_coefficient, rolling_friction, steepest_slope
 from wfbook.standing import Standing
 from wfbook.view.style import FOOT, FORCE, INK, LIMIT, MEASURED, PLANNED, WHEEL, Picture, tidy
 
@@ -145,11 +145,12 @@ def coasting(standing: Standing, coefficient: float, gravity: float = 9.81) -> P
     axes = figure.subplots()
     tidy(axes)
     t, start = standing.t, float(standing.com_velocity[0, 0])
-    for sign, name, style in (
-        (-1.0, "against rolling (eq. 29, corrected)", "-"),
-        (1.0, "eq. 29 as printed", ":"),
+    resistance = rolling_friction(gravity, coefficient)  # of a unit mass
+    for acceleration, name, style in (
+        (resistance, "against rolling (eq. 29, corrected)", "-"),
+        (-resistance, "eq. 29 as printed", ":"),
     ):
-        speed = np.maximum(start + sign * coefficient * gravity * t, 0.0)
+        speed = np.maximum(start + acceleration * t, 0.0)
         axes.plot(t, speed, color=PLANNED, linestyle=style, linewidth=2.2, label=name, gid=name)
     axes.plot(t, standing.com_velocity[:, 0], color=MEASURED, linewidth=1.2, label="measured", gid="measured")
     axes.set_ylim(0.0, None)
