@@ -11,9 +11,16 @@ _VALUES = {"attribute", "data", "property"}
 
 
 def _not_a_type(_app: Sphinx, what: str, _name: str, _thing: Any, _options: Any, lines: list[str]) -> None:
-    """Keep the words before a colon: napoleon takes "Kinds of contact: ..." for a constant of that type."""
+    """Keep the words before a colon: napoleon takes "Kinds of contact: ..." for a constant of that type.
+
+    And what comes after "Returns:" likewise, unless its type is given as empty.
+    """
     if what in _VALUES:
         lines[:0] = ["..", ""]
+    for index, line in enumerate(lines[:-1]):
+        if line.strip() in ("Returns:", "Yields:") and ":" in lines[index + 1]:
+            text = lines[index + 1].lstrip()
+            lines[index + 1] = f"{lines[index + 1].removesuffix(text)}: {text}"
 
 
 def _several(_app: Sphinx, _what: str, _name: str, _thing: Any, _options: Any, lines: list[str]) -> None:
