@@ -126,7 +126,7 @@ def test_solutions_are_folded_and_marks_are_gone(book):
         text = text_of(book, page)
         stored = Stored(book_chapters.FOLDER / f"{Path(page).stem}.ipynb")
         solutions = sum(bool(cell.metadata.get("nbgrader", {}).get("solution")) for cell in stored.cells)
-    XX
+        assert text.count("Show the solution") == solutions > 0
         for mark in ("BEGIN SOLUTION", "NBVAL", "Run All Cells"):
             assert mark not in text
 

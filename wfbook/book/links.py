@@ -143,24 +143,38 @@ def _definition(name: str) -> str:
     return f"{getattr(thing, '__module__', path)}.{getattr(thing, '__qualname__', last)}"
 
 
-def _say_which(app: Sphinx, document: nodes.document) -> None:
-    """Give the names in signatures the module that they are imported from: several modules have a ``Run``."""
+def _say_which(_app: Sphinx, document: nodes.document) -> None:
+    """Say in which module a name is, where several have one of that name: one's own, an imported, the nearest."""
     for node in document.findall(pending_xref):
         module, name = node.get("py:module"), node.get("reftarget", "")
         if node.get("refdomain") == "py" and module and "." not in name:
-            node["reftarget"] = _imported(module).get(name, name)
+            node["reftarget"] = _meant(module).get(name, name)
 
 
 @cache
-def _imported(module: str) -> dict[str, str]:
-    """Return what a module takes from the library, also what only its type hints need: full name by name."""
-    tree = ast.parse(Path(importlib.import_module(module).__file__).read_text(encoding="utf-8"))
-    return {
-        alias.asname or alias.name: _definition(f"{node.module}.{alias.name}")
-        for node in ast.walk(tree)
-        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("wfbook")
-        for alias in node.names
-    }
+def _meant(module: str) -> dict[str, str]:
+    """Return what names mean in a module, in full: what it defines, imports, or has beside it in its package."""
+    path = Path(importlib.import_module(module).__file__)
+    package = module if path.name == "__init__.py" else module.rpartition(".")[0]
+    found = {}
+    for beside in sorted(path.parent.glob("*.py")) if "." in package else ():
+        name = f"{package}.{beside.stem}"
+        found |= {beside.stem: name} | {defined: f"{name}.{defined}" for defined in _defined(beside)}
+    for node in ast.walk(_tree(path)):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("wfbook"):
+            for alias in node.names:
+                found[alias.asname or alias.name] = _definition(f"{node.module}.{alias.name}")
+    return found | {name: f"{module}.{name}" for name in _defined(path)}
+
+
+def _defined(path: Path) -> list[str]:
+    """Return the classes and functions of a module."""
+    return [node.name for node in _tree(path).body if isinstance(node, ast.ClassDef | ast.FunctionDef)]
+
+
+@cache
+def _tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
 
 
 def _elsewhere(
