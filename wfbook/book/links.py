@@ -144,7 +144,7 @@ def _definition(name: str) -> str:
 
 
 def _say_which(_app: Sphinx, document: nodes.document) -> None:
-    """Say in which module a name is, where several have one of that name: one's own, an imported, the nearest."""
+    """Say in which module a name is, where several have one of that name."""
     for node in document.findall(pending_xref):
         module, name = node.get("py:module"), node.get("reftarget", "")
         if node.get("refdomain") == "py" and module and "." not in name:
@@ -153,7 +153,7 @@ def _say_which(_app: Sphinx, document: nodes.document) -> None:
 
 @cache
 def _meant(module: str) -> dict[str, str]:
-    """Return what names mean in a module, in full: what it defines, imports, or has beside it in its package."""
+    """Return what names mean in a module, in full: its own, imported ones, those beside it in its package."""
     path = Path(importlib.import_module(module).__file__)
     package = module if path.name == "__init__.py" else module.rpartition(".")[0]
     found = {}
