@@ -94,7 +94,7 @@ def everything(folder):
 WRONG = {
     "no command": ([], "COMMAND"),
     "unknown command": (["fly"], "'fly'"),
-    "commands of later versions": (["book"], "'book'"),
+    "no such chapter": (["book", "--only", "77"], "'77'"),
     "no terrain": (["run"], "TERRAIN is missing"),
     "unknown terrain": (["run", "falt"], "did you mean 'flat'?"),
     "far-off terrain": (["run", "moon"], "unknown terrain 'moon'"),

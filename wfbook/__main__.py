@@ -30,6 +30,7 @@ from wfbook.arguments import (
     whole,
     wrong_input,
 )
+from wfbook.book import command as book
 from wfbook.classroom import command as classroom
 from wfbook.equations import command as equations
 from wfbook.paper import command as paper
@@ -141,6 +142,7 @@ def _parser() -> argparse.ArgumentParser:
     table2.add_to(commands)
     study.add_to(commands)
     paper.add_to(commands)
+    book.add_to(commands)
     classroom.add_to(commands)
     equations.add_to(commands)
 

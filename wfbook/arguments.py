@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NoReturn
 
-from wfbook.results import ResultFolder
+from wfbook.results import ResultFolder, WholeFolder
 
 OK, FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
 """Exit codes."""
@@ -99,6 +99,21 @@ def result_folder(target: str | Path, names: tuple[str, ...]) -> Iterator[Result
     with contextlib.ExitStack() as stack:
         try:
             folder = stack.enter_context(ResultFolder(target, names))
+        except OSError as error:
+            raise CommandError(
+                f"--out {str(target)!r} can't be written: {error.strerror}", WRONG_INPUT
+            ) from None
+        yield folder
+
+
+@contextlib.contextmanager
+def whole_folder(target: str | Path, mark: str) -> Iterator[WholeFolder]:
+    """Open a folder that is replaced as a whole; that it can't be, or must not be, is wrong input."""
+    with contextlib.ExitStack() as stack:
+        try:
+            folder = stack.enter_context(WholeFolder(target, mark))
+        except ValueError as error:
+            raise CommandError(f"--out {error}", WRONG_INPUT) from None
         except OSError as error:
             raise CommandError(
                 f"--out {str(target)!r} can't be written: {error.strerror}", WRONG_INPUT

@@ -100,6 +100,15 @@ def acceleration(lam: Any, f: Any, mass: float) -> list[Any]:
 
     Returns:
         Components of shape ``(K,)``.
+
+    Example:
+        A body of 12 kg that is carried by twice its weight is thrown up by once its weight:
+
+        >>> from wfbook.centroidal import GRAVITY, acceleration
+        >>> weight, none = np.array([[12.0 * GRAVITY]]), np.zeros((1, 1))
+        >>> a = acceleration([none, none, 2.0 * weight], [none, none, none], 12.0)
+        >>> bool(np.isclose(a[2], GRAVITY).all())
+        True
     """
     gravity = (0.0, 0.0, -GRAVITY)
     return [(lam[i].sum(axis=1) + f[i].sum(axis=1)) / mass + gravity[i] for i in range(3)]
@@ -132,6 +141,14 @@ def contact_torque(lever: Any, lam: Any) -> list[Any]:
 
     Returns:
         Components of shape ``(K, L)``.
+
+    Example:
+        A force of 100 N up, 0.2 m to the left of the centre of mass, rolls it to the right:
+
+        >>> from wfbook.centroidal import contact_torque
+        >>> lever, lam = np.array([0.0, 0.2, -0.3]), np.array([0.0, 0.0, 100.0])
+        >>> np.allclose(contact_torque(lever, lam), [20.0, 0.0, 0.0])
+        True
     """
     return [lever[j] * lam[k] - lever[k] * lam[j] for _, j, k in _CYCLIC]
 
@@ -173,6 +190,13 @@ def least_bounds(lever: Any, lam: Any, scale: float = 1.0) -> tuple[list[Any], l
 
     Returns:
         Components of U⁺ and of U⁻, of shape ``(K, L)``; ``(U⁺ − U⁻)/4`` is the torque of eq. 8.
+
+    Example:
+        >>> from wfbook.centroidal import contact_torque, least_bounds
+        >>> lever, lam = np.array([0.1, 0.2, -0.3]), np.array([5.0, 0.0, 60.0])
+        >>> plus, minus = least_bounds(lever, lam)
+        >>> bool(np.allclose(np.subtract(plus, minus) / 4.0, contact_torque(lever, lam)))
+        True
     """
     plus, minus = ([a**2 + b**2 for a, b in side] for side in bound_terms(lever, lam, scale))
     return plus, minus

@@ -43,6 +43,15 @@ def friction_cone(n: Any, t: Any, b: Any, mu_t: float, mu_b: float) -> np.ndarra
 
     Returns:
         A force of that shape, ``<= 0`` exactly when the force is inside the cone.
+
+    Example:
+        The pyramid of the same coefficients also holds what the cone forbids, both at once:
+
+        >>> from wfbook.friction import friction_cone, friction_pyramid
+        >>> inside = lambda rows: all(row <= 0.0 for row in np.atleast_1d(rows))
+        >>> asked = (10.0, 6.0, 6.0, 0.7, 0.7)
+        >>> inside(friction_pyramid(*asked)), inside(friction_cone(*asked))
+        (True, False)
     """
     used = [
         np.abs(part) / mu if mu > 0 else np.where(np.asarray(part) == 0.0, 0.0, np.inf)
@@ -63,6 +72,11 @@ def ground_force(asked: np.ndarray, mu_t: float, mu_b: float) -> np.ndarray:
 
     Returns:
         ``(3,)`` along n, t, b.
+
+    Example:
+        >>> from wfbook.friction import ground_force
+        >>> ground_force(np.array([10.0, 8.0, 6.0]), 0.5, 0.5).round(6).tolist()
+        [10.0, 4.0, 3.0]
     """
     n, t, b = np.asarray(asked, float)
     if n <= 0.0:
@@ -107,6 +121,13 @@ def steepest_slope(mu_t: float, mu_b: float, heading: float = 0.0, cone: bool = 
         mu_b: friction coefficient across it.
         heading: of the way down, as there.
         cone: ask the friction cone instead of the pyramid of eq. 26.
+
+    Example:
+        A slope is held up to the angle whose tangent is the coefficient of friction:
+
+        >>> from wfbook.friction import steepest_slope
+        >>> bool(np.isclose(np.tan(steepest_slope(0.7, 0.7, cone=True)), 0.7))
+        True
     """
     along, across = abs(np.cos(heading)), abs(np.sin(heading))
     used = [part / mu if mu > 0 else np.inf for part, mu in ((along, mu_t), (across, mu_b)) if part > 1e-12]

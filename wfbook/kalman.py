@@ -79,6 +79,14 @@ def correct(
         z: ``(...)`` measured speed.
         measured_noise: standard deviation of ``z``.
         gate: squared distance ``(z − v)² / S`` beyond which a measurement is not believed.
+
+    Example:
+        A measurement as good as the guess counts as much, and halves the variance:
+
+        >>> from wfbook.kalman import correct
+        >>> v, P, refused = correct(np.array(1.0), np.array(0.04), np.array(2.0), 0.2)
+        >>> float(v), float(P.round(9)), bool(refused)
+        (1.5, 0.02, False)
     """
     S = P + measured_noise**2
     refused = (z - v) ** 2 / S > gate

@@ -115,6 +115,11 @@ def swing_count(S: np.ndarray) -> np.ndarray:
     Returns:
         ``(L + 1, J)`` int8, the paper's ``s`` with the row ``s_0`` that it lacks: row n is 1 where n legs
         swing, so that ``n · s = Σ_l S`` and each column sums to 1.
+
+    Example:
+        >>> from wfbook.modes import swing_count
+        >>> swing_count(np.array([[1, 0], [0, 0], [0, 0], [1, 0]])).argmax(axis=0).tolist()
+        [2, 0]
     """
     S = np.asarray(S)
     return (np.arange(len(S) + 1)[:, None] == S.sum(axis=0)).astype(np.int8)
@@ -136,6 +141,12 @@ def contact_centroid(p: np.ndarray, S: np.ndarray) -> np.ndarray:
 
     Raises:
         ValueError: in some slot all legs swing, n = N_l: eq. 15 would divide by zero.
+
+    Example:
+        >>> from wfbook.modes import contact_centroid
+        >>> p = np.array([[[1.0, 1.0, 0.0], [1.0, -1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0]]])
+        >>> contact_centroid(p, np.array([[1], [0], [0], [1]])).tolist()
+        [[0.0, 0.0, 0.0]]
     """
     S = np.asarray(S)
     stands = np.repeat(1 - S.T, len(p) // S.shape[1], axis=0)

@@ -94,7 +94,14 @@ def _in_plane(points: np.ndarray, normal: np.ndarray) -> np.ndarray:
 
 
 def halfspaces(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Unit rows A and b of A @ p <= b for a counter-clockwise polygon, from its first two coordinates."""
+    """Unit rows A and b of A @ p <= b for a counter-clockwise polygon, from its first two coordinates.
+
+    Example:
+        >>> from wfbook.polygon import halfspaces
+        >>> A, b = halfspaces(np.array([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]]))
+        >>> bool((A @ [1.0, 0.5] <= b).all()), bool((A @ [1.0, 1.5] <= b).all())
+        (True, False)
+    """
     corner = points[:, :2]
     edge = np.roll(corner, -1, axis=0) - corner
     A = np.column_stack((edge[:, 1], -edge[:, 0])) / np.linalg.norm(edge, axis=1, keepdims=True)

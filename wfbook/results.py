@@ -85,6 +85,65 @@ class ResultFolder:
                 self._made.pop().rmdir()
 
 
+class WholeFolder(ResultFolder):
+    """A result folder of files that nobody can name beforehand: what was there gives way as a whole.
+
+    Only an empty folder, or one that an earlier run has filled, is replaced.
+
+    Attributes:
+        target: where the results will be.
+        path: where to write them meanwhile.
+        scratch: for everything else; it goes away in any case.
+    """
+
+    def __init__(self, target: str | os.PathLike, mark: str) -> None:
+        """Remember the target; ``mark`` is a file by which a folder of this kind is known."""
+        super().__init__(target, ())
+        self._mark = mark
+        self._hidden = self.scratch = self.target
+
+    def __enter__(self) -> Self:
+        """Make the hidden folder.
+
+        Raises:
+            OSError: the target, or a folder above it, can't be written.
+            ValueError: the target holds something else.
+        """
+        if self.target.is_dir() and any(self.target.iterdir()) and not (self.target / self._mark).is_file():
+            raise ValueError(
+                f"{str(self.target)!r} holds something else, which would be lost: choose another"
+            )
+        super().__enter__()
+        self._hidden, self.path, self.scratch = self.path, self.path / "new", self.path / "scratch"
+        self.path.mkdir()
+        self.scratch.mkdir()
+        return self
+
+    def publish(self) -> None:
+        """Put the new folder into the place of the old one, which goes back if that fails.
+
+        Raises:
+            OSError: a folder can't be moved.
+        """
+        old = self._hidden / "old"
+        if self.target.exists():
+            os.replace(self.target, old)
+        try:
+            os.replace(self.path, self.target)
+        except OSError:
+            if old.exists():
+                os.replace(old, self.target)
+            raise
+        self._made.clear()
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Remove the hidden folder, with what was replaced, and the parents that were made for nothing."""
+        self.path = self._hidden
+        super().__exit__(kind, error, trace)
+
+
 @contextlib.contextmanager
 def undisturbed() -> Iterator[None]:
     """Ignore interrupts while results are written, for the impatient interrupt twice."""

@@ -35,6 +35,14 @@ def condition_matrix(smoothness: int = 2, apex: bool = False) -> np.ndarray:
 
     ``G @ a`` is what a polynomial with the coefficients ``a`` (ascending powers of the phase, eq. 2) does
     there. ``smoothness`` 2 is the paper's quintic, with ``apex`` its septic.
+
+    Example:
+        >>> from wfbook.swing import condition_matrix
+        >>> condition_matrix(smoothness=1).astype(int)
+        array([[1, 0, 0, 0],
+               [0, 1, 0, 0],
+               [1, 1, 1, 1],
+               [0, 1, 2, 3]])
     """
     rows = conditions(smoothness, apex)
     powers = np.eye(len(rows))
@@ -83,6 +91,14 @@ def quintic_basis(phase: np.ndarray, derivative: int = 0, smoothness: int = 2) -
 
     Returns:
         ``(..., 4)``: the weights of ``p0``, ``T v0``, ``pf`` and ``T vf``.
+
+    Example:
+        At mid-swing a swing at rest at both ends is half way, at 15/8 of its mean speed:
+
+        >>> from wfbook.swing import quintic_basis
+        >>> half = np.array([0.5])
+        >>> quintic_basis(half)[:, [0, 2]].tolist(), quintic_basis(half, derivative=1)[:, [0, 2]].tolist()
+        ([[0.5, 0.5]], [[-1.875, 1.875]])
     """
     return _basis(phase, derivative, smoothness, ((0.0, 0), (0.0, 1), (1.0, 0), (1.0, 1)))
 
@@ -137,6 +153,13 @@ def swing_position(
 
     Returns:
         ``(n, 3)``.
+
+    Example:
+        >>> from wfbook.swing import swing_position
+        >>> swing_position(np.array([0.0, 0.5, 1.0]), 0.3, [0.2, 0.1, 0.0], [0.3, 0.1, 0.0], 0.06).round(6)
+        array([[0.2 , 0.1 , 0.  ],
+               [0.25, 0.1 , 0.06],
+               [0.3 , 0.1 , 0.  ]])
     """
     start, end = np.asarray(start, float), np.asarray(end, float)
     v0 = np.zeros(3) if start_velocity is None else np.asarray(start_velocity, float)

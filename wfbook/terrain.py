@@ -131,6 +131,12 @@ class Terrain:
 
     Raises:
         ValueError: the name is no text, or there is no region.
+
+    Example:
+        >>> from wfbook.terrain import Terrain, stepping_stones
+        >>> stepping_stones().save("stones.json")
+        >>> Terrain.load("stones.json") == stepping_stones()
+        True
     """
 
     name: str
@@ -212,7 +218,14 @@ class Terrain:
 
 
 def flat(rolling_resistance: float = 0.0) -> Terrain:
-    """Level ground at z = 0, 12 m by 4 m, with or without rolling friction (Paper A, IV-A.1 and 2)."""
+    """Level ground at z = 0, 12 m by 4 m, with or without rolling friction (Paper A, IV-A.1 and 2).
+
+    Example:
+        >>> from wfbook.terrain import flat
+        >>> floor = flat(rolling_resistance=0.01)
+        >>> floor.height(1.0, 0.2), floor.region_at(1.0, 0.2)
+        (0.0, 0)
+    """
     surface = _surface(rolling_resistance)
     name = "flat-friction" if rolling_resistance > 0 else "flat"
     return Terrain(name, (_strip((-2.0, 0.0), (10.0, 0.0), surface, "ground"),))
@@ -236,6 +249,12 @@ def ramp(
 
     Raises:
         ValueError: a parameter is out of range.
+
+    Example:
+        >>> from wfbook.terrain import ramp
+        >>> down = ramp()
+        >>> down.height(0.0, 0.0), down.height(2.0, 0.0) < 0.0
+        (0.0, True)
     """
     if direction not in ("down", "up"):
         raise ValueError(f"direction: must be 'down' or 'up', is {show(direction)}")

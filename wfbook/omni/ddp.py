@@ -303,6 +303,18 @@ def solve(
         controls: ``(N, m)`` first guess; a good one is a warm start.
         tolerance: of the largest ``|Q_u|``, relative to ``1 + |cost|``.
         most: iterations.
+
+    Example:
+        Where the dynamics are linear and the cost is quadratic, one step is the optimum:
+
+        >>> from wfbook.omni.ddp import solve
+        >>> from wfbook.omni.systems import LinearQuadratic
+        >>> one, none = np.eye(1), np.zeros((1, 1))
+        >>> falling = LinearQuadratic(F=one, G=one, c=np.array([0.1]), Q=one, R=one, N=none, P=one)
+        >>> solution = solve(falling, np.array([1.0]), np.zeros((8, 1)))
+        >>> _, first, *rest = [iterate.cost for iterate in solution.iterates]
+        >>> solution.converged, np.allclose(rest, first)
+        (True, True)
     """
     done: list[Iterate] = []
     for iterate in iterations(system, start, controls):

@@ -26,6 +26,11 @@ def wheel_velocities(twist: np.ndarray, positions: np.ndarray) -> np.ndarray:
     Args:
         twist: ``(3,)`` v_x, v_y, omega.
         positions: ``(n, 2)`` of the wheels.
+
+    Example:
+        >>> from wfbook.omni.wheels import rotation, wheel_velocities
+        >>> wheel_velocities(rotation(2.0), np.array([[0.3, 0.2]])).tolist()
+        [[-0.4, 0.6]]
     """
     twist = np.asarray(twist, dtype=float)
     return twist[:2] + twist[2] * np.asarray(positions) @ J.T
@@ -37,7 +42,15 @@ def twist_about(centre: np.ndarray, rate: float) -> np.ndarray:
 
 
 def instantaneous_centre(twist: np.ndarray) -> np.ndarray | None:
-    """Return the point ``(2,)``, of the body that a twist ``(3,)`` turns about; None if it does not turn."""
+    """Return the point ``(2,)``, of the body that a twist ``(3,)`` turns about; None if it does not turn.
+
+    Example:
+        >>> from wfbook.omni.wheels import crab, instantaneous_centre, twist_about
+        >>> instantaneous_centre(twist_about(np.array([0.4, -0.1]), 0.8)).round(9).tolist()
+        [0.4, -0.1]
+        >>> instantaneous_centre(crab(0.6, 0.3)) is None
+        True
+    """
     return None if twist[2] == 0.0 else J @ twist[:2] / twist[2]
 
 
@@ -72,7 +85,13 @@ def rotation(rate: float) -> np.ndarray:
 
 
 def wrap(angles: np.ndarray | float) -> np.ndarray:
-    """Return angles brought between -pi (included) and pi by whole turns."""
+    """Return angles brought between -pi (included) and pi by whole turns.
+
+    Example:
+        >>> from wfbook.omni.wheels import wrap
+        >>> float(np.degrees(wrap(np.radians(179.0 - -179.0))).round(9))
+        -2.0
+    """
     return (np.asarray(angles) + np.pi) % (2.0 * np.pi) - np.pi
 
 
@@ -201,6 +220,16 @@ def body_twist(
     Returns:
         ``(3,)`` twist by the pseudo-inverse, and ``(n, 2)`` the wheels' skid sideways and along: zero if
         they are steered and driven for one and the same twist.
+
+    Example:
+        The wheels' angles and speeds give back the twist that they were made from:
+
+        >>> from wfbook.omni.robot import WHEEL_POSITIONS
+        >>> from wfbook.omni.wheels import body_twist, wheel_command
+        >>> command = wheel_command(np.array([0.5, 0.2, 0.8]), WHEEL_POSITIONS, np.zeros(4))
+        >>> twist, skid = body_twist(command.steering, command.speed, WHEEL_POSITIONS)
+        >>> twist.round(9).tolist(), bool(np.abs(skid).max() < 1e-12)
+        ([0.5, 0.2, 0.8], True)
     """
     S = constraint_matrix(steering, positions)
     wanted = np.concatenate([np.zeros(len(speed)), speed])

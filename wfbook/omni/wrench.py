@@ -126,6 +126,15 @@ def line_contact(mu: float, width: float, rolling: float = 0.0) -> WrenchCone:
 
     Raises:
         ValueError: the width is not positive.
+
+    Example:
+        A wheel whose load stands beyond the end of its line of 4 cm tips over:
+
+        >>> from wfbook.omni.wrench import line_contact
+        >>> wheel = line_contact(mu=0.7, width=0.04)
+        >>> load = lambda y: np.array([0.0, 0.0, 100.0, 100.0 * y, 0.0, 0.0])
+        >>> bool(wheel.admits(load(0.019))), bool(wheel.admits(load(0.021)))
+        (True, False)
     """
     if not width > 0.0:
         raise ValueError(f"width: must be positive, is {width!r}")
@@ -232,7 +241,13 @@ def penalty_derivatives(cone: WrenchCone, wrench: np.ndarray) -> tuple[np.ndarra
 
 
 def wrench_of(points: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """Return what forces ``(..., n, 3)`` at points ``(n, 3)`` of a contact add up to, ``(..., 6)``."""
+    """Return what forces ``(..., n, 3)`` at points ``(n, 3)`` of a contact add up to, ``(..., 6)``.
+
+    Example:
+        >>> from wfbook.omni.wrench import line_ends, wrench_of
+        >>> wrench_of(line_ends(0.04), np.array([[0.0, 0.0, 75.0], [0.0, 0.0, 25.0]])).tolist()
+        [0.0, 0.0, 100.0, 1.0, 0.0, 0.0]
+    """
     moments = np.cross(points, forces)
     return np.concatenate([np.sum(forces, axis=-2), np.sum(moments, axis=-2)], axis=-1)
 

@@ -34,6 +34,7 @@ _PLANNING = (
 _TELLING = (
     "__main__.py",
     "arguments.py",
+    "book",
     "classroom",
     "omni_command.py",
     "quoted.py",

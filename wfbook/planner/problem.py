@@ -145,6 +145,16 @@ class Problem:
 
     Raises:
         ValueError: a field is wrong; the message names it and its value.
+
+    Example:
+        >>> from wfbook.planner import Problem
+        >>> from wfbook.terrain import flat
+        >>> problem = Problem(flat(), goal=(0.5, 0.0), slots=5)
+        >>> problem.knots, round(problem.dt, 9)
+        (15, 0.1)
+        >>> Problem(flat(), goal=(0.5, 0.0), slots=0)
+        Traceback (most recent call last):
+        ValueError: slots: 0 is not a whole number of at least 1
     """
 
     terrain: Terrain

@@ -79,7 +79,7 @@ def solve_executable(
 
     Raises:
         NoPlanError: the time limit came before a plan that can be polished.
-        Others as for :func:`solve`.
+        InfeasibleError: there is no plan.
     """
     check_limits(gap, time_limit)
     check_start(problem)

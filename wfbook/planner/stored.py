@@ -24,6 +24,12 @@ def stored(name: str, relaxed: bool = False) -> Plan:
 
     Raises:
         ValueError: there is no plan of that name.
+
+    Example:
+        >>> from wfbook.planner import stored
+        >>> plan = stored("flat")
+        >>> plan.slots, plan.terrain.name, bool(plan.distance > 0.9)
+        (10, 'flat', True)
     """
     if name not in names():
         raise ValueError(f"name {name!r} is none of the stored plans {', '.join(names())}")

@@ -120,6 +120,25 @@ def page(
     )
 
 
+def viewer_script() -> str:
+    """Return Meshcat's viewer with its licences, as a script that many pages can share."""
+    viewer = files("meshcat") / "viewer"
+    licences = [viewer / "LICENSE", viewer / "dist" / "main.min.js.LICENSE.txt"]
+    notice = "\n".join(path.read_text(encoding="utf-8").replace("*/", "* /") for path in licences)
+    return f"/* {notice} */\n{(viewer / 'dist' / 'main.min.js').read_text(encoding='utf-8')}"
+
+
+def sharing(page: str, address: str) -> str:
+    """Return a page that takes the viewer from a file that others take it from, too.
+
+    Args:
+        page: as :func:`page` returns it.
+        address: of the file with :func:`viewer_script`, from the page.
+    """
+    own = f'<script type="text/plain" id="viewer">{_viewer()}</script>'
+    return page.replace(own, f'<script src="{html.escape(address)}"></script>')
+
+
 def frame(page: str, height: int = 420) -> str:
     """Return an iframe that holds a page, for a notebook's output."""
     source = page.replace("&", "&amp;").replace('"', "&quot;")
@@ -129,12 +148,8 @@ def frame(page: str, height: int = 420) -> str:
 
 @cache
 def _viewer() -> str:
-    """Meshcat's viewer behind the licences that ask to travel with it, compressed, as text."""
-    viewer = files("meshcat") / "viewer"
-    licences = [viewer / "LICENSE", viewer / "dist" / "main.min.js.LICENSE.txt"]
-    notice = "\n".join(path.read_text(encoding="utf-8").replace("*/", "* /") for path in licences)
-    code = (viewer / "dist" / "main.min.js").read_text(encoding="utf-8")
-    return _text(_zip(f"/* {notice} */\n{code}".encode()))
+    """The viewer, compressed, as text."""
+    return _text(_zip(viewer_script().encode()))
 
 
 @cache

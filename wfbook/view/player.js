@@ -135,9 +135,11 @@ class Player {
 }
 
 async function load() {
-  const script = document.createElement("script");
-  script.textContent = new TextDecoder().decode(await unzip("viewer"));
-  document.head.append(script);
+  if (!window.MeshCat) {  // a page of the book has it from a file already
+    const script = document.createElement("script");
+    script.textContent = new TextDecoder().decode(await unzip("viewer"));
+    document.head.append(script);
+  }
   const viewer = new MeshCat.Viewer(element("stage"), false);
   draw(viewer, await unzip("commands"));
   viewer.set_3d_pane_size();
