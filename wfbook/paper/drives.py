@@ -117,9 +117,8 @@ def proof(runs: Sequence[Drive]) -> str:
     seeds = ", ".join(str(run.meta["seed"]) for run in runs)
     noise = "measured with noise" if runs[0].meta["noise"] else "true state"
     ended = sum(not run.metrics["finished"] for run in runs)
-    return f"{runs[0].meta['controller']}, seeds {seeds}, {noise}" + (
-        f"; {ended} ended early" if ended else ""
-    )
+    head = f"{runs[0].meta['controller']}, {'seed' if len(runs) == 1 else 'seeds'} {seeds}, {noise}"
+    return head + (f"; {ended} ended early" if ended else "")
 
 
 def over(runs: Sequence[Drive], measure: Callable[[Drive], float]) -> tuple[float, list[float]]:
