@@ -113,12 +113,14 @@ def drive(seed: int = 0, wobble: float = 0.001, controller: str = "ddp") -> Driv
         "hand_height_max_error_m": size,
         "hand_level_max_error_m": 0.5 * size,
         "hand_turn_max_rad": 3.0 * size,
-        "hand_rpy_mean_rad": rpy.mean(axis=0).tolist(),
-        "hand_rpy_std_rad": rpy.std(axis=0).tolist(),
         "base_rms_rad": 0.01,
         "finished": True,
         "events": [],
-    } | {f"plan_ms_{name}": value for name, value in (("p5", 4.0), ("median", 5.0), ("p95", 6.0))}
+    }
+    for axis, name in enumerate(("roll", "pitch", "yaw")):
+        metrics[f"hand_{name}_mean_rad"] = float(rpy[:, axis].mean())
+        metrics[f"hand_{name}_std_rad"] = float(rpy[:, axis].std())
+    metrics |= {f"plan_ms_{name}": value for name, value in (("p5", 4.0), ("median", 5.0), ("p95", 6.0))}
     meta = {"seed": seed, "controller": controller, "noise": True, "delay": 0.009}
     return Drive(
         t=t,

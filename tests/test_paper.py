@@ -220,6 +220,8 @@ def test_records_as_cells():
     assert cells(said.to_dict()) == (
         *("cost of transport, feet and wheels", "0.105", "0.0523", "0.0500 to 0.0550", "0.50", "gap 1 %"),
     )
+    angle = compared("waves.roll", -1.57081234, "", [-1.571, -1.5706])
+    assert cells(angle.to_dict())[1:4] == ("-1.578 rad", "-1.571 rad", "-1.571 to -1.571")
     assert cells(stated("fig9.mostly_wheels", False, 40.0, "%").to_dict())[1:5] == (
         "stated",
         "no: 40 %",

@@ -42,7 +42,7 @@ def test_errors_are_those_of_the_run(run):
     figure = omni.gait(run)
     drawn = {line.get_gid(): line.get_ydata() for axes in figure.axes for line in axes.lines}
     np.testing.assert_allclose(drawn["height"], 1e3 * (run.hand - run.hand_ref)[:, 2])
-    assert np.abs(drawn["yaw"]).max() == pytest.approx(1e3 * run.metrics["hand_rpy_max_error_rad"][2])
+    assert np.abs(drawn["yaw"]).max() == pytest.approx(1e3 * run.metrics["hand_yaw_max_error_rad"])
     assert "event" not in drawn
     fallen = omni.gait(replace(run, events=[(0.5, "fallen: the trunk is tipped over")]))
     assert {line.get_gid() for axes in fallen.axes for line in axes.lines} >= {"event"}

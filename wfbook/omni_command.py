@@ -191,7 +191,8 @@ def table(metrics: dict[str, Any], folder: Path) -> str:
         folder: where the results are.
     """
 
-    def shown(values: list[float], form: str = ".3f") -> str:
+    def shown(what: str, scale: float = 1.0, form: str = ".3f") -> str:
+        values = (scale * metrics[f"hand_{name}_{what}_rad"] for name in ("roll", "pitch", "yaw"))
         return ", ".join(format(round(value, 3) + 0.0, form) for value in values)  # + 0.0: no "-0.000"
 
     cost = "none, it stays where it is"
@@ -206,8 +207,8 @@ def table(metrics: dict[str, Any], folder: Path) -> str:
         "hand, height": f"{metrics['hand_height_mean_m']:.4f} m on average, "
         f"std {1e3 * metrics['hand_height_std_m']:.2f} mm, "
         f"error at most {1e3 * metrics['hand_height_max_error_m']:.2f} mm",
-        "hand, roll pitch yaw": f"{shown(metrics['hand_rpy_mean_rad'])} rad on average, "
-        f"error at most {shown([1e3 * v for v in metrics['hand_rpy_max_error_rad']], '.1f')} mrad",
+        "hand, roll pitch yaw": f"{shown('mean')} rad on average, "
+        f"error at most {shown('max_error', 1e3, '.1f')} mrad",
         "cost of transport": cost,
         "body error, rms": f"{1e3 * metrics['base_rms_m']:.1f} mm, "
         f"{math.degrees(metrics['base_rms_rad']):.2f} degrees",

@@ -18,6 +18,8 @@ from wfbook.omni.robot import Omni
 if TYPE_CHECKING:
     from wfbook.omni.simulate import OmniRun
 
+ANGLES = ("roll", "pitch", "yaw")
+
 _TOUCH = 5.0
 """Force of a wheel that touches, N."""
 _AWAY = 10
@@ -45,8 +47,8 @@ def hand_of(run: "OmniRun") -> dict[str, Any]:
 
     ``hand_height_*`` are of the hand above the level ground at the start, in metres, its error that from the
     target; ``hand_level_max_error_m`` is the largest horizontal distance from where it should be;
-    ``hand_turn_max_rad`` the largest angle from how it should be turned. ``hand_rpy_*`` are roll, pitch and
-    yaw: their mean and standard deviation, and the largest error of each.
+    ``hand_turn_max_rad`` the largest angle from how it should be turned. ``hand_roll_*``, ``hand_pitch_*``
+    and ``hand_yaw_*`` are mean, standard deviation and largest error of each.
     """
     height, error, rpy = run.hand[:, 2], run.hand - run.hand_ref, hand_rpy(run)
     pairs = zip(run.hand_rotation_ref, run.hand_rotation, strict=True)
@@ -57,9 +59,14 @@ def hand_of(run: "OmniRun") -> dict[str, Any]:
         "hand_height_max_error_m": float(np.abs(error[:, 2]).max()),
         "hand_level_max_error_m": float(np.linalg.norm(error[:, :2], axis=1).max()),
         "hand_turn_max_rad": float(max(turns)),
-        "hand_rpy_mean_rad": rpy.mean(axis=0).tolist(),
-        "hand_rpy_std_rad": rpy.std(axis=0).tolist(),
-        "hand_rpy_max_error_rad": np.abs(rpy - hand_rpy_ref(run)).max(axis=0).tolist(),
+    } | {
+        f"hand_{name}_{what}_rad": float(value)
+        for what, values in (
+            ("mean", rpy.mean(axis=0)),
+            ("std", rpy.std(axis=0)),
+            ("max_error", np.abs(rpy - hand_rpy_ref(run)).max(axis=0)),
+        )
+        for name, value in zip(ANGLES, values, strict=True)
     }
 
 

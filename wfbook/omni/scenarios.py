@@ -180,8 +180,8 @@ def combined(each: float = 3.0, **options: Any) -> OmniRun:
 
 def turn(angle: float = TURN, rate: float = TURN_RATE, **options: Any) -> OmniRun:
     """Turn on the spot and back, the hand held where it is in the world."""
-    lasts, there = angle / rate, np.array([0.0, 0.0, rate])
-    course = [(_steering_time(there) + lasts, there), (TURN_WAIT, np.zeros(3)), (lasts, -there)]
+    lasts, there, back = angle / rate, np.array([0.0, 0.0, rate]), np.array([0.0, 0.0, -rate])
+    course = [(_steering_time(there) + lasts, there), (TURN_WAIT, np.zeros(3)), (lasts, back)]
     return on_the_floor(course, target=held_in_the_world(), **options)
 
 

@@ -117,9 +117,8 @@ def proof(runs: Sequence[Drive]) -> str:
     seeds = ", ".join(str(run.meta["seed"]) for run in runs)
     noise = "measured with noise" if runs[0].meta["noise"] else "true state"
     ended = sum(not run.metrics["finished"] for run in runs)
-    return f"{runs[0].meta['controller']}, seeds {seeds}, {noise}" + (
-        f"; {ended} ended early" if ended else ""
-    )
+    head = f"{runs[0].meta['controller']}, {'seed' if len(runs) == 1 else 'seeds'} {seeds}, {noise}"
+    return head + (f"; {ended} ended early" if ended else "")
 
 
 def over(runs: Sequence[Drive], measure: Callable[[Drive], float]) -> tuple[float, list[float]]:
@@ -147,13 +146,10 @@ def hand_records(key: str, runs: Sequence[Drive]) -> list[Record]:
     records = height_records(
         {"mean_m": f"{key}.mean", "std_m": f"{key}.std", "max_error_m": f"{key}.max"}, runs
     )
-    for axis, name in enumerate(("roll", "pitch", "yaw")):
-        shift = SHIFT if name == "pitch" else 0.0
+    for name in ("roll", "pitch", "yaw"):
         for part, end in (("mean", ""), ("std", "_std")):
-            add = shift if part == "mean" else 0.0
-            middle, values = over(
-                runs,
-                lambda run, part=part, add=add, axis=axis: run.metrics[f"hand_rpy_{part}_rad"][axis] + add,
-            )
+            shift = SHIFT if (name, part) == ("pitch", "mean") else 0.0
+            metric = f"hand_{name}_{part}_rad"
+            middle, values = over(runs, lambda run, m=metric, shift=shift: run.metrics[m] + shift)
             records.append(compared(f"{key}.{name}{end}", middle, proof(runs), values))
     return records
