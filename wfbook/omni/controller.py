@@ -197,6 +197,22 @@ class WholeBody(OnWheels):
         self._sent.append(torques)
         return self._command(planned[7:NQ_LOCKED], planned[27:], torques, _SHARE, self._push)
 
+    def resume(self, x: np.ndarray, other: "WholeBody | None" = None) -> None:
+        """Begin anew from rest, with the base where it is.
+
+        Args:
+            x: ``(41,)`` state in the base's axes.
+            other: a controller whose estimate of the payload and of lasting errors is taken over.
+        """
+        if other is not None:
+            self.ocp.load(other.ocp.payload)
+            self._offset, self._turn = other._offset.copy(), other._turn.copy()
+            self._sent.extend(other._sent)
+        self._past.extend([self.wheels.base.state.copy()] * self._past.maxlen)
+        self._goal = self._before = None
+        self._since = np.inf
+        self.ocp.hold(x)
+
     def _weigh(self, x: np.ndarray) -> None:
         """Correct the payload by how the arm accelerated since the last time, and how it should have.
 

@@ -8,7 +8,7 @@ is at rest.
 import os
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self
 
@@ -21,15 +21,18 @@ from wfbook.omni.controller import FEEDBACK, ArmAlone, Command, OnWheels, WholeB
 from wfbook.omni.costs import Weights
 from wfbook.omni.driving import Driving, holding_torques
 from wfbook.omni.locked import MOTORS, Target, nominal_target
-from wfbook.omni.robot import DAMPING, NOMINAL_HEIGHT, NU, NV, STIFFNESS, Omni, contact_offsets, posture
+from wfbook.omni.robot import DAMPING, NOMINAL_HEIGHT, NU, NV, STIFFNESS, WHEELS_V, Omni, contact_offsets, posture
+from wfbook.omni.machine import ON_LEGS, Mode
+from wfbook.omni.on_legs import BRAKE, BRAKE_DAMPING
+from wfbook.omni.two_modes import Drive, Task, TwoModes, describe
 from wfbook.omni.waves import LENGTH, PEAK, RUN_UP, Ground, waves
 from wfbook.terrain import Terrain
 
 CONTROLLERS = ("ddp", "ik-level", "ik-true")
 """The paper's; and inverse kinematics of the arm that takes the trunk to be level, or knows its true pose."""
 
-FORMAT = 1
-TIMINGS = ("tick_ms_median", "tick_ms_p95", "plan_ms_median", "plan_ms_p95", "real_time_factor")
+FORMAT = 2
+TIMINGS = ("tick_ms_median", "tick_ms_p95", "plan_ms_median", "plan_ms_p95", "real_time_factor", "stride_s_max")
 """Metrics that differ from run to run of one seed; they are not in the run file."""
 
 _SETTLE = 0.5
@@ -38,6 +41,8 @@ _TILT, _CROUCH = 0.6, 0.25
 _LOST, _PROGRESS, _PATIENCE = 0.15, 0.01, 0.5
 """A hand that is further off than the first and has not come nearer by the second for the third is lost."""
 _FAILURES = 5
+_FELT = 15.0
+"""Force of the ground on a wheel that a sensor in its fork feels, N."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +84,8 @@ class OmniRun(Driving):
         tau: ``(N, 23)`` torques that acted.
         hand_rotation: ``(N, 3, 3)``.
         hand_ref: ``(N, 3)`` where the hand was to be.
+        mode: ``(N,)`` of :class:`wfbook.omni.machine.Mode`, the state machine's.
+        stance: ``(N, 4)`` bool, which wheels the controller takes to stand.
         events: what went wrong: time and text.
         metrics: figures of merit, see :func:`metrics_of`.
         meta: how it was run.
@@ -86,12 +93,14 @@ class OmniRun(Driving):
 
     LOGGED: ClassVar[tuple[str, ...]] = (
         *("t", "qpos", "qvel", "com", "hand", "p", "contact_force", "pose", "twist", "steering"),
-        *("tau", "hand_rotation", "hand_ref"),
+        *("tau", "hand_rotation", "hand_ref", "mode", "stance"),
     )
 
     tau: np.ndarray
     hand_rotation: np.ndarray
     hand_ref: np.ndarray
+    mode: np.ndarray
+    stance: np.ndarray
     events: list[tuple[float, str]] = field(default_factory=list)
     metrics: dict[str, Any] = field(default_factory=dict)
     meta: dict[str, Any] = field(default_factory=dict)
@@ -149,7 +158,7 @@ def run_waves(speed: float = 0.5, count: int = 5, **options: Any) -> OmniRun:
 
 def run(
     terrain: Terrain,
-    course: Sequence[tuple[float, Sequence[float]]],
+    course: Sequence[tuple[float, Sequence[float]] | Task],
     controller: str = "ddp",
     start: float = 0.0,
     delay: float = 0.0,
@@ -165,7 +174,8 @@ def run(
 
     Args:
         terrain: to drive on; it must be level at height 0 around the start.
-        course: wanted twists one after the other: seconds and ``(3,)``.
+        course: wanted twists one after the other: seconds and ``(3,)``. Or tasks of :mod:`.two_modes`, among
+            which such pairs may be: then the mode state machine is in the loop.
         controller: one of :data:`CONTROLLERS`.
         start: x of the robot at first; it faces along x.
         delay: age of what the controller measures, s; it knows it.
@@ -182,8 +192,12 @@ def run(
     """
     if controller not in CONTROLLERS:
         raise ValueError(f"controller: {controller!r} is none of {', '.join(CONTROLLERS)}")
-    if not course or not all(duration > 0.0 for duration, _ in course):
+    tasks = [Drive(*item) if isinstance(item, tuple | list) else item for item in course]
+    if not tasks or not all(task.duration > 0.0 for task in tasks if isinstance(task, Drive)):
         raise ValueError("course: needs twists that last")
+    timed = all(isinstance(task, Drive) for task in tasks)
+    if not timed and controller != "ddp":
+        raise ValueError(f"controller: {controller!r} can't step")
     began = time.perf_counter()
     target = nominal_target() if target is None else target
     robot = Omni(terrain, trunk_mass_scale, payload)
@@ -193,13 +207,18 @@ def run(
     base, ground = Base(), Ground(terrain)
     base.state[0] = start
     known = delay, noise, np.random.default_rng(seed)
-    driver: OnWheels
-    if controller == "ddp":
+    driver: OnWheels | TwoModes
+    if not timed:
+        driver = TwoModes(tasks, ground, target, base, delay, weights)
+    elif controller == "ddp":
         driver = WholeBody(ground, target, base, delay, weights)
     else:
         driver = ArmAlone(ground, target, base, delay, level=controller == "ik-level")
     loop = _Loop(robot, driver, known, push)
-    loop.drive(course)
+    if timed:
+        loop.drive([(task.duration, task.twist) for task in tasks])
+    else:
+        loop.perform()
     columns = {name: np.array([sample[name] for sample in loop.samples]) for name in loop.samples[0]}
     meta = {
         "controller": controller,
@@ -207,9 +226,12 @@ def run(
         "noise": noise is not None,
         "seed": seed,
         "payload": payload,
-        "payload_estimate": driver.ocp.payload if isinstance(driver, WholeBody) else None,
+        "payload_estimate": None if isinstance(driver, ArmAlone) else driver.payload,
         "trunk_mass_scale": trunk_mass_scale,
-        "course": [[float(duration), [float(v) for v in twist]] for duration, twist in course],
+        "course": [
+            [float(task.duration), [float(v) for v in task.twist]] if timed else describe(task)
+            for task in tasks
+        ],
     }
     result = OmniRun(**columns, terrain=terrain, events=loop.events, meta=meta)
     elapsed = time.perf_counter() - began
@@ -223,7 +245,7 @@ class _Loop:
     def __init__(
         self,
         robot: Omni,
-        driver: OnWheels,
+        driver: OnWheels | TwoModes,
         known: tuple[float, Noise | None, np.random.Generator],
         push: tuple[Sequence[float], float, float] | None,
     ) -> None:
@@ -237,31 +259,47 @@ class _Loop:
         self.tau = np.zeros(NU)
         self._astray = self._failures = 0
         self._nearest = np.inf
+        self._tasks = driver if isinstance(driver, TwoModes) else None
 
     def drive(self, course: Sequence[tuple[float, Sequence[float]]]) -> None:
         """Settle, follow the course, and stop; or stop when something goes wrong."""
         ends = np.cumsum([duration for duration, _ in course])
         twists = np.array([twist for _, twist in course], dtype=float)
-        stop, step, data = float(ends[-1]), -round(1000 * _SETTLE), self.robot.data
+
+        def wanted(t: float) -> np.ndarray:
+            leg = int(np.searchsorted(ends, t, side="right")) if t >= 0.0 else len(twists)
+            return twists[leg] if leg < len(twists) else np.zeros(3)
+
+        self._run(wanted, float(ends[-1]))
+
+    def perform(self) -> None:
+        """Settle, and let the driver carry out its tasks; or stop when something goes wrong."""
+        self._run(lambda t: np.zeros(3), np.inf)
+
+    def _run(self, wanted: Callable[[float], np.ndarray], stop: float) -> None:
+        """Simulate until a time, or until the driver is done or something goes wrong, and then the rest."""
+        step, data = -round(1000 * _SETTLE), self.robot.data
         while True:
             t = step / 1000
-            if self.events:
+            if self.events or (self._tasks is not None and self._tasks.done):
                 stop = min(stop, t)
             moving = bool(self.events) and np.abs(data.qvel[:6]).max() > _STILL
             if t >= stop + (_LONGEST_REST if moving else _REST):
                 return
-            leg = int(np.searchsorted(ends, t, side="right")) if t >= 0.0 else len(twists)
-            self._step(step, twists[leg] if leg < len(twists) else np.zeros(3))
+            self._step(step, wanted(t))
             step += 1
 
     def _step(self, step: int, wanted: np.ndarray) -> None:
         """Simulate a millisecond."""
         robot, t = self.robot, step / 1000
-        self.past.append((robot.data.qpos.copy(), robot.data.qvel.copy()))
+        felt = None if self._tasks is None else robot.contact_wrenches()[:, 2] > _FELT
+        self.past.append((robot.data.qpos.copy(), robot.data.qvel.copy(), felt))
         if step % round(1000 * FEEDBACK) == 0 and not self.events:
-            qpos, qvel = self.past[0]
+            qpos, qvel, felt = self.past[0]
             if self.noise is not None:
                 qpos, qvel = self.noise.disturb(qpos, qvel, self.rng)
+            if self._tasks is not None:
+                self._tasks.felt = felt
             began = time.perf_counter()
             self.command = self.driver.tick(qpos, qvel, wanted)
             self.times.append(time.perf_counter() - began)
@@ -295,7 +333,9 @@ class _Loop:
         self._astray += 1
         if off < max(_LOST, self._nearest - _PROGRESS):
             self._nearest, self._astray = off, 0
-        if isinstance(driver, WholeBody) and self._astray > _PATIENCE / FEEDBACK:
+        if self._tasks is not None and self._tasks.trouble is not None:
+            return self._tasks.trouble
+        if not isinstance(driver, ArmAlone) and self._astray > _PATIENCE / FEEDBACK:
             return f"the hand is {off:.2f} m from where it should be: out of reach"
         return None
 
@@ -306,7 +346,12 @@ class _Loop:
         """
         angles, fallen = np.array(self.robot.data.qpos[7:]), "fallen" in self.events[-1][1]
         torques = np.zeros(NU) if fallen else holding_torques(self.robot.data.qpos)
-        return Command(torques, angles, np.zeros(NU), (0.3 if fallen else 1.0) * STIFFNESS, DAMPING)
+        stiffness, damping = (0.3 if fallen else 1.0) * STIFFNESS, DAMPING.copy()
+        if self._tasks is not None:
+            if self._tasks.machine.mode in ON_LEGS:
+                stiffness[WHEELS_V - 6], damping[WHEELS_V - 6] = BRAKE, BRAKE_DAMPING
+            self._tasks.halt()
+        return Command(torques, angles, np.zeros(NU), stiffness, damping)
 
     def _hand_ref(self) -> np.ndarray:
         """Return where the hand should be in the world, ``(3,)``."""
@@ -334,6 +379,8 @@ class _Loop:
             "tau": np.clip(self.tau, -robot.efforts, robot.efforts),
             "hand_rotation": rotation,
             "hand_ref": self._hand_ref(),
+            "mode": np.int8(Mode.WHEELED if self._tasks is None else self._tasks.machine.mode),
+            "stance": np.ones(4, bool) if self._tasks is None else self._tasks.standing.copy(),
         }
 
     def timings(self, elapsed: float) -> dict[str, float]:
@@ -346,6 +393,7 @@ class _Loop:
             "plan_ms_median": float(np.median(plans)),
             "plan_ms_p95": float(np.percentile(plans, 95)),
             "real_time_factor": float(len(self.times) * FEEDBACK / elapsed),
+            "stride_s_max": max((p.solve_time for p in self._tasks.plans), default=0.0) if self._tasks else 0.0,
         }
 
 

@@ -1,0 +1,87 @@
+"""Chapter 12: experiments in which the robot needs its legs: a bar across the way (Paper B, Fig. 5)."""
+
+from typing import Any
+
+import numpy as np
+
+from wfbook.modes import LEGS
+from wfbook.omni.robot import WHEEL_POSITIONS, WHEEL_RADIUS
+from wfbook.omni.simulate import OmniRun, run
+from wfbook.omni.stride import Gait
+from wfbook.omni.two_modes import Drive, RollTo, StepTo, Task
+from wfbook.terrain import Region, Terrain
+
+_SURFACE = {"mu_foot": 0.7, "mu_wheel": 0.0, "mu_wheel_lateral": 0.7, "rolling_resistance": 0.0}
+_HALF_WIDTH = 2.0
+FRONT, REAR = ("FL", "FR"), ("RL", "RR")
+
+_BEFORE, _REAR_BEFORE, _BEHIND = 0.03, 0.07, 0.04
+"""Gaps between a wheel and the obstacle: of the front wheels before it, of the rear ones, which roll on with
+their shanks as the robot leans ahead, and of all behind it; in metres."""
+
+
+def bar(height: float = 0.08, width: float = 0.05, x: float = 0.9) -> Terrain:
+    """Return a level floor with a bar across it.
+
+    Args:
+        height: of the bar.
+        width: of its top, along x.
+        x: of its near face.
+
+    Raises:
+        ValueError: a height or width that is not positive.
+    """
+    if not height > 0.0 or not width > 0.0:
+        raise ValueError(f"bar: height {height} and width {width} must be positive")
+    edges = [(-2.0, x, 0.0), (x, x + width, height), (x + width, x + width + 4.0, 0.0)]
+    regions = [
+        Region(
+            [
+                [x0, -_HALF_WIDTH, z],
+                [x1, -_HALF_WIDTH, z],
+                [x1, _HALF_WIDTH, z],
+                [x0, _HALF_WIDTH, z],
+            ],
+            **_SURFACE,
+            group=f"level {z:g}",
+        )
+        for x0, x1, z in edges
+    ]
+    return Terrain(f"bar {100 * height:g} cm", tuple(regions))
+
+
+def over_the_bar(
+    width: float = 0.05, x: float = 0.9, beyond: float = 0.5, gait: Gait | None = None
+) -> list[Task]:
+    """Return the tasks that bring the robot over a bar: the front wheels step over, it rolls on, the rear do.
+
+    Args:
+        width: of the bar.
+        x: of its near face.
+        beyond: how far the rear wheels roll on behind it.
+        gait: of the steps.
+    """
+    gait = Gait() if gait is None else gait
+    landing = x + width + WHEEL_RADIUS + _BEHIND
+    return [
+        RollTo(x - WHEEL_RADIUS - _BEFORE, FRONT),
+        StepTo(dict.fromkeys(FRONT, landing), gait),
+        RollTo(x - WHEEL_RADIUS - _REAR_BEFORE, REAR),
+        StepTo(dict.fromkeys(REAR, landing), gait),
+        RollTo(landing + beyond, REAR),
+    ]
+
+
+def run_obstacle(
+    height: float = 0.08, width: float = 0.05, gait: Gait | None = None, **options: Any
+) -> OmniRun:
+    """Drive up to a bar, step over it, and drive on.
+
+    Args:
+        height: of the bar.
+        width: of it, along the way.
+        gait: of the steps.
+        options: of :func:`wfbook.omni.simulate.run`: delay, noise, seed, payload, trunk_mass_scale, …
+    """
+    terrain = bar(height, width)
+    return run(terrain, over_the_bar(width, gait=gait), **options)

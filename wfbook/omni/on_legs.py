@@ -1,0 +1,216 @@
+"""Chapter 12: the controller of legged mode: a planned stride, followed by a receding horizon (Paper B, Fig. 5).
+
+Steering and wheels are locked: brakes hold the angles in which they were locked. The whole stride is planned
+while the robot stands (:mod:`.motion`). Then the problem of a short horizon is solved again and again as in
+wheeled mode (:mod:`.controller`), with the plan for a reference, and the torques follow its gains.
+
+A wheel that swings is one that stands as soon as it is felt to touch late in its swing. If it is not felt when
+it should, the stride waits for it and the wheel is lowered.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pinocchio as pin
+
+from wfbook.modes import LEGS
+from wfbook.omni.base import Base
+from wfbook.omni.controller import PLAN, Command, WholeBody
+from wfbook.omni.costs import Weights
+from wfbook.omni.locked import NQ_LOCKED, Target, holding_effort
+from wfbook.omni.motion import LANDING, Plan, keep_landed
+from wfbook.omni.problem import OptimalControl
+from wfbook.omni.robot import STEERS_V, WHEELS_V
+from wfbook.omni.rolling import Axes
+from wfbook.omni.waves import Ground
+
+BRAKE, BRAKE_DAMPING = 150.0, 3.0
+"""Of a locked wheel, N m/rad and N m s."""
+
+LEGGED_WEIGHTS = Weights(leg=1e5, com=(3000.0, 3000.0, 2000.0), posture=3.0, contact=0.1, least_force=15.0)
+"""Of the short horizon; the posture is the plan's."""
+
+_EXPECTED = 0.6
+"""Share of a swing after which touching the ground means that the wheel has landed."""
+_LOWERING, _SEARCH = 0.15, 0.8
+"""Speed at which a wheel that has not found the ground is lowered, m/s; for how long, s."""
+_AWAITED = 4
+"""Nodes after which a wheel that is late is expected on the ground."""
+
+
+@dataclass(frozen=True)
+class Path:
+    """A plan's references, one for each time step of the controller.
+
+    Attributes:
+        targets: what is asked for.
+        stances: ``(4,)`` bool each.
+        swings: leg, first step in the air, first step on the ground.
+    """
+
+    targets: list[Target]
+    stances: list[tuple[bool, ...]]
+    swings: list[tuple[int, int, int]]
+
+
+def path_of(plan: Plan, model: pin.Model, step: float = PLAN) -> Path:
+    """Return a plan's references at a controller's time steps."""
+    asked = plan.schedule
+    fine = round(asked.dt / step)
+    targets, stances = [], []
+    last = len(asked.targets) - 1
+    for k in range(last * fine + 1):
+        node, share = divmod(k, fine)
+        node, share = (last - 1, 1.0) if node == last else (node, share / fine)
+        after = min(node + 1, last)
+        q = pin.interpolate(model, plan.xs[node][:NQ_LOCKED], plan.xs[after][:NQ_LOCKED], share)
+        here, there = asked.targets[node], asked.targets[after]
+        effort = min(node, last - 1)
+        targets.append(
+            replace(
+                here,
+                hand=here.hand + share * (there.hand - here.hand),
+                com=plan.com[node] + share * (plan.com[after] - plan.com[node]),
+                trunk=pin.Quaternion(q[3:7]).toRotationMatrix(),
+                posture=q[7:],
+                effort=plan.us[effort],
+                feet=here.feet + share * (there.feet - here.feet),
+            )
+        )
+        stances.append(asked.stances[min(k // fine, last)])
+    swings = [(swing.leg, swing.first * fine, swing.last * fine) for swing in asked.swings]
+    return Path(targets, stances, swings)
+
+
+class OnLegs(WholeBody):
+    """The paper's controller in legged mode.
+
+    Args:
+        ground: that the wheels are on.
+        target: of the hand and the body, over level ground.
+        base: that is commanded; at rest.
+        delay: age of what is measured.
+        weights: of eq. 17.
+        nodes: of the horizon.
+
+    Attributes:
+        standing: ``(4,)`` bool, which wheels are taken to stand.
+        felt: ``(4,)`` bool, which wheels were felt to touch when the state was measured.
+        finished: whether there is nothing left to do.
+        trouble: what went wrong, if anything.
+    """
+
+    def __init__(
+        self,
+        ground: Ground,
+        target: Target | None = None,
+        base: Base | None = None,
+        delay: float = 0.0,
+        weights: Weights | None = None,
+        nodes: int = 20,
+    ) -> None:
+        super().__init__(ground, target, base, delay, nodes=1)
+        self.ocp = OptimalControl(nodes, PLAN, "legged", LEGGED_WEIGHTS if weights is None else weights)
+        self.standing = self.felt = np.ones(4, bool)
+        self.trouble: str | None = None
+        self.finished = True
+        self._rest = self.target
+        self._path: Path | None = None
+        self._k, self._late = 0, 0.0
+        self._landed: set[int] = set()
+        self._locked = np.zeros(4), np.zeros(4)
+
+    def lock(self, qpos: np.ndarray, steering: np.ndarray) -> None:
+        """Close the brakes where the wheels ``qpos (30,)`` are, and hold the steering ``(4,)``."""
+        self._locked = np.array(steering), np.array(qpos[1 + WHEELS_V])
+
+    def begin(self, plan: Plan) -> None:
+        """Follow a plan from now on."""
+        self._path, self._k, self._late = path_of(plan, self.model), 0, 0.0
+        self._landed = set()
+        self.finished = False
+
+    def stay(self, target: Target) -> None:
+        """Stand on all wheels."""
+        self._path, self._rest, self.target, self.finished = None, target, target, True
+        self.standing = np.ones(4, bool)
+
+    def _weigh(self, x: np.ndarray) -> None:
+        """Correct the payload while all wheels stand: steps shake the arm for other reasons."""
+        if self.standing.all():
+            super()._weigh(x)
+        else:
+            self._before = None
+
+    def _plan(self, x: np.ndarray, steering: np.ndarray, axes: Axes) -> None:
+        """Solve the problem on from its last solution, one iteration."""
+        ocp = self.ocp
+        places, normals = self._roll(x, steering, axes)
+        ocp.place_contacts(x, steering, normals)
+        stances, targets = self._asked(x, places)
+        ocp.stand(stances)
+        keep_landed(ocp, stances, round(LANDING / ocp.dt))
+        self.target = targets[0]
+        corrected = self._corrected()
+        off = corrected.hand - self.target.hand
+        ocp.refer(
+            [
+                replace(target, hand=target.hand + off, hand_rotation=corrected.hand_rotation)
+                for target in targets
+            ]
+        )
+        ocp.shift()
+        try:
+            ocp.solve(x, 1)
+            self.solved = True
+        except FloatingPointError:
+            self.solved = False
+
+    def _command(
+        self, angles: np.ndarray, rates: np.ndarray, torques: np.ndarray, share: float, push: np.ndarray
+    ) -> Command:
+        """Return a command with steering and wheels locked."""
+        command = super()._command(angles, rates, torques, share, push)
+        command.angles[STEERS_V - 6], command.angles[WHEELS_V - 6] = self._locked
+        command.rates[WHEELS_V - 6] = 0.0
+        command.stiffness[WHEELS_V - 6], command.damping[WHEELS_V - 6] = BRAKE, BRAKE_DAMPING
+        return command
+
+    def _asked(self, x: np.ndarray, places: np.ndarray) -> tuple[list[tuple[bool, ...]], list[Target]]:
+        """Return stances and targets of the horizon's nodes, and move on along the plan."""
+        count, path = self.ocp.nodes + 1, self._path
+        if path is None:
+            up = np.array([0.0, 0.0, places[:, 2].mean()])
+            rest = replace(self._rest, com=self._rest.com + up, effort=holding_effort(self.ocp.model, x))
+            return [(True,) * 4] * count, [rest] * count
+        k, last = self._k, len(path.targets) - 1
+        stances = np.array([path.stances[min(k + j, last)] for j in range(count)])
+        targets = [path.targets[min(k + j, last)] for j in range(count)]
+        waiting = False
+        for leg, first, landing in path.swings:
+            if not first <= k < landing:
+                continue
+            if k == first:
+                self._landed.discard(leg)
+            elif self.felt[leg] and k - first > _EXPECTED * (landing - first):
+                self._landed.add(leg)
+            if leg in self._landed:
+                stances[: landing - k, leg] = True
+            elif k == landing - 1:
+                waiting = True
+                self._late += PLAN
+                stances[:_AWAITED, leg] = False
+                targets = [lowered(target, leg, _LOWERING * self._late) for target in targets]
+                if self._late > _SEARCH:
+                    self.trouble = f"the wheel {LEGS[leg]} does not find the ground"
+        self.standing = stances[0].copy()
+        if not waiting:
+            self._late, self._k, self.finished = 0.0, min(k + 1, last), k == last
+        return [tuple(row) for row in stances.tolist()], targets
+
+
+def lowered(target: Target, leg: int, depth: float) -> Target:
+    """Return a target with one wheel lower."""
+    feet = target.feet.copy()
+    feet[leg, 2] -= depth
+    return replace(target, feet=feet)
