@@ -27,8 +27,11 @@ from wfbook.omni.waves import Ground
 BRAKE, BRAKE_DAMPING = 150.0, 3.0
 """Of a locked wheel, N m/rad and N m s."""
 
-LEGGED_WEIGHTS = Weights(leg=1e5, com=(3000.0, 3000.0, 2000.0), posture=3.0, contact=0.1, least_force=15.0)
+LEGGED_WEIGHTS = Weights(leg=1e5, com=(1e4, 1e4, 5e3), posture=1.0, contact=0.1, least_force=15.0)
 """Of the short horizon; the posture is the plan's."""
+import os
+exec(os.environ.get("LW",""))
+_ITERATIONS = int(os.environ.get("IT","1"))
 
 _EXPECTED = 0.6
 """Share of a swing after which touching the ground means that the wheel has landed."""
@@ -45,11 +48,15 @@ class Path:
     Attributes:
         targets: what is asked for.
         stances: ``(4,)`` bool each.
+        xs: states ``(41,)``.
+        us: torques ``(14,)``.
         swings: leg, first step in the air, first step on the ground.
     """
 
     targets: list[Target]
     stances: list[tuple[bool, ...]]
+    xs: list[np.ndarray]
+    us: list[np.ndarray]
     swings: list[tuple[int, int, int]]
 
 
@@ -57,7 +64,7 @@ def path_of(plan: Plan, model: pin.Model, step: float = PLAN) -> Path:
     """Return a plan's references at a controller's time steps."""
     asked = plan.schedule
     fine = round(asked.dt / step)
-    targets, stances = [], []
+    targets, stances, xs, us = [], [], [], []
     last = len(asked.targets) - 1
     for k in range(last * fine + 1):
         node, share = divmod(k, fine)
@@ -78,8 +85,12 @@ def path_of(plan: Plan, model: pin.Model, step: float = PLAN) -> Path:
             )
         )
         stances.append(asked.stances[min(k // fine, last)])
+        velocity = plan.xs[node][NQ_LOCKED:]
+        velocity = velocity + share * (plan.xs[after][NQ_LOCKED:] - velocity)
+        xs.append(np.concatenate([q, velocity]))
+        us.append(plan.us[effort])
     swings = [(swing.leg, swing.first * fine, swing.last * fine) for swing in asked.swings]
-    return Path(targets, stances, swings)
+    return Path(targets, stances, xs, us, swings)
 
 
 class OnLegs(WholeBody):
@@ -159,9 +170,9 @@ class OnLegs(WholeBody):
                 for target in targets
             ]
         )
-        ocp.shift()
+        self._warm(x)
         try:
-            ocp.solve(x, 1)
+            ocp.solve(x, _ITERATIONS)
             self.solved = True
         except FloatingPointError:
             self.solved = False
@@ -175,6 +186,16 @@ class OnLegs(WholeBody):
         command.rates[WHEELS_V - 6] = 0.0
         command.stiffness[WHEELS_V - 6], command.damping[WHEELS_V - 6] = BRAKE, BRAKE_DAMPING
         return command
+
+    def _warm(self, x: np.ndarray) -> None:
+        """Begin with the plan, or with the last solution where there is none."""
+        ocp, path = self.ocp, self._path
+        if path is None:
+            ocp.shift()
+            return
+        last, k = len(path.xs) - 1, max(self._k - 1, 0)
+        ocp.xs = [path.xs[min(k + j, last)].copy() for j in range(ocp.nodes + 1)]
+        ocp.us = [path.us[min(k + j, last - 1)].copy() for j in range(ocp.nodes)]
 
     def _asked(self, x: np.ndarray, places: np.ndarray) -> tuple[list[tuple[bool, ...]], list[Target]]:
         """Return stances and targets of the horizon's nodes, and move on along the plan."""
