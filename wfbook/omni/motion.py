@@ -17,7 +17,7 @@ from wfbook.modes import LEGS
 from wfbook.omni import costs
 from wfbook.omni.costs import Model, Weights
 from wfbook.omni.locked import NQ_LOCKED, Target, contact_model, held_rows, holding_effort
-from wfbook.omni.problem import FRICTION, OptimalControl
+from wfbook.omni.problem import OptimalControl
 from wfbook.omni.robot import contact_offsets
 from wfbook.omni.stride import Gait, Heights, Schedule, margin, schedule
 
@@ -25,6 +25,9 @@ STRIDE_WEIGHTS = Weights(
     leg=1e5, com=(2e4, 2e4, 5e3), trunk=(200.0, 200.0, 200.0), posture=0.05, contact=1.0, least_force=25.0
 )
 """Of a stride: posture leads less, for legs have to stretch; wheels keep to their paths."""
+
+CAREFUL = 0.4
+"""Friction coefficient that steps reckon with: less than there is, for a wheel that slips is lost to the plan."""
 
 LANDING = 0.1
 """How long a wheel is still asked to be where it has landed, s."""
@@ -67,7 +70,7 @@ class Motion(OptimalControl):
         nodes: int,
         dt: float = 0.02,
         weights: Weights = STRIDE_WEIGHTS,
-        mu: float = FRICTION,
+        mu: float = CAREFUL,
         solver: str = "BoxFDDP",
         payload: float = 0.0,
         without: Iterable[str] = (),

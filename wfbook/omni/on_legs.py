@@ -18,7 +18,7 @@ from wfbook.omni.base import Base
 from wfbook.omni.controller import PLAN, Command, WholeBody
 from wfbook.omni.costs import Weights
 from wfbook.omni.locked import NQ_LOCKED, Target, holding_effort
-from wfbook.omni.motion import LANDING, Plan, keep_landed
+from wfbook.omni.motion import CAREFUL, LANDING, Plan, keep_landed
 from wfbook.omni.problem import OptimalControl
 from wfbook.omni.robot import STEERS_V, WHEELS_V
 from wfbook.omni.rolling import Axes
@@ -121,7 +121,8 @@ class OnLegs(WholeBody):
         nodes: int = 20,
     ) -> None:
         super().__init__(ground, target, base, delay, nodes=1)
-        self.ocp = OptimalControl(nodes, PLAN, "legged", LEGGED_WEIGHTS if weights is None else weights)
+        weights = LEGGED_WEIGHTS if weights is None else weights
+        self.ocp = OptimalControl(nodes, PLAN, "legged", weights, mu=CAREFUL)
         self.standing = self.felt = np.ones(4, bool)
         self.trouble: str | None = None
         self.finished = True
