@@ -5,10 +5,10 @@ from typing import Any
 import numpy as np
 
 from wfbook.modes import LEGS
-from wfbook.omni.robot import WHEEL_POSITIONS, WHEEL_RADIUS
+from wfbook.omni.robot import WHEEL_RADIUS
 from wfbook.omni.simulate import OmniRun, run
-from wfbook.omni.stride import Gait
-from wfbook.omni.two_modes import Drive, RollTo, StepTo, Task
+from wfbook.omni.stride import Gait, margin
+from wfbook.omni.two_modes import RollTo, StepTo, Task
 from wfbook.terrain import Region, Terrain
 
 _SURFACE = {"mu_foot": 0.7, "mu_wheel": 0.0, "mu_wheel_lateral": 0.7, "rolling_resistance": 0.0}
@@ -18,6 +18,8 @@ FRONT, REAR = ("FL", "FR"), ("RL", "RR")
 _BEFORE, _REAR_BEFORE, _BEHIND = 0.03, 0.07, 0.04
 """Gaps between a wheel and the obstacle: of the front wheels before it, of the rear ones, which roll on with
 their shanks as the robot leans ahead, and of all behind it; in metres."""
+_SPEED, _ROLLING = 0.4, 5.0
+"""Of the attempt to roll over a bar, m/s, and its duration, s."""
 
 
 def bar(height: float = 0.08, width: float = 0.05, x: float = 0.9) -> Terrain:
@@ -73,7 +75,7 @@ def over_the_bar(
 
 
 def run_obstacle(
-    height: float = 0.08, width: float = 0.05, gait: Gait | None = None, **options: Any
+    height: float = 0.08, width: float = 0.05, gait: Gait | None = None, step: bool = True, **options: Any
 ) -> OmniRun:
     """Drive up to a bar, step over it, and drive on.
 
@@ -81,7 +83,27 @@ def run_obstacle(
         height: of the bar.
         width: of it, along the way.
         gait: of the steps.
+        step: whether the robot steps; without it it tries to roll over the bar in wheeled mode.
         options: of :func:`wfbook.omni.simulate.run`: delay, noise, seed, payload, trunk_mass_scale, …
     """
     terrain = bar(height, width)
-    return run(terrain, over_the_bar(width, gait=gait), **options)
+    if not step:
+        return run(terrain, [(_ROLLING, [_SPEED, 0.0, 0.0])], **options)
+    run_ = run(terrain, over_the_bar(width, gait=gait), **options)
+    run_.metrics.update(lifts(run_))
+    return run_
+
+
+def lifts(run_: OmniRun) -> dict[str, Any]:
+    """Return figures of a run's steps: the smallest margin of each lift, and how long a wheel was in the air.
+
+    The margin is the distance of the centre of mass to the nearest edge of the triangle of the wheels that the
+    controller takes to stand, in metres.
+    """
+    margins, airtime = {}, {}
+    for leg, name in enumerate(LEGS):
+        lifted = np.flatnonzero(~run_.stance[:, leg])
+        if lifted.size:
+            margins[name] = float(min(margin(run_.com[i], run_.p[i], run_.stance[i]) for i in lifted))
+            airtime[name] = float(lifted.size * (run_.t[1] - run_.t[0]))
+    return {"lift_margin_m": margins, "airtime_s": airtime}

@@ -2,7 +2,8 @@
 
 Steering and wheels are locked: brakes hold the angles in which they were locked. The whole stride is planned
 while the robot stands (:mod:`.motion`). Then the problem of a short horizon is solved again and again as in
-wheeled mode (:mod:`.controller`), with the plan for a reference, and the torques follow its gains.
+wheeled mode (:mod:`.controller`), with the plan for a reference, and the torques follow its gains. Each solution
+begins with the plan: in one iteration the last solution would not find which wheels carry next.
 
 A wheel that swings is one that stands as soon as it is felt to touch late in its swing. If it is not felt when
 it should, the stride waits for it and the wheel is lowered.
@@ -29,9 +30,6 @@ BRAKE, BRAKE_DAMPING = 150.0, 3.0
 
 LEGGED_WEIGHTS = Weights(leg=1e5, com=(1e4, 1e4, 5e3), posture=1.0, contact=0.1, least_force=15.0)
 """Of the short horizon; the posture is the plan's."""
-import os
-exec(os.environ.get("LW",""))
-_ITERATIONS = int(os.environ.get("IT","1"))
 
 _EXPECTED = 0.6
 """Share of a swing after which touching the ground means that the wheel has landed."""
@@ -173,7 +171,7 @@ class OnLegs(WholeBody):
         )
         self._warm(x)
         try:
-            ocp.solve(x, _ITERATIONS)
+            ocp.solve(x, 1)
             self.solved = True
         except FloatingPointError:
             self.solved = False

@@ -21,7 +21,17 @@ from wfbook.omni.controller import FEEDBACK, ArmAlone, Command, OnWheels, WholeB
 from wfbook.omni.costs import Weights
 from wfbook.omni.driving import Driving, holding_torques
 from wfbook.omni.locked import MOTORS, Target, nominal_target
-from wfbook.omni.robot import DAMPING, NOMINAL_HEIGHT, NU, NV, STIFFNESS, WHEELS_V, Omni, contact_offsets, posture
+from wfbook.omni.robot import (
+    DAMPING,
+    NOMINAL_HEIGHT,
+    NU,
+    NV,
+    STIFFNESS,
+    WHEELS_V,
+    Omni,
+    contact_offsets,
+    posture,
+)
 from wfbook.omni.machine import ON_LEGS, Mode
 from wfbook.omni.on_legs import BRAKE, BRAKE_DAMPING
 from wfbook.omni.two_modes import Drive, Task, TwoModes, describe
@@ -32,7 +42,14 @@ CONTROLLERS = ("ddp", "ik-level", "ik-true")
 """The paper's; and inverse kinematics of the arm that takes the trunk to be level, or knows its true pose."""
 
 FORMAT = 2
-TIMINGS = ("tick_ms_median", "tick_ms_p95", "plan_ms_median", "plan_ms_p95", "real_time_factor", "stride_s_max")
+TIMINGS = (
+    "tick_ms_median",
+    "tick_ms_p95",
+    "plan_ms_median",
+    "plan_ms_p95",
+    "real_time_factor",
+    "stride_s_max",
+)
 """Metrics that differ from run to run of one seed; they are not in the run file."""
 
 _SETTLE = 0.5
@@ -393,7 +410,9 @@ class _Loop:
             "plan_ms_median": float(np.median(plans)),
             "plan_ms_p95": float(np.percentile(plans, 95)),
             "real_time_factor": float(len(self.times) * FEEDBACK / elapsed),
-            "stride_s_max": max((p.solve_time for p in self._tasks.plans), default=0.0) if self._tasks else 0.0,
+            "stride_s_max": max((p.solve_time for p in self._tasks.plans), default=0.0)
+            if self._tasks
+            else 0.0,
         }
 
 
