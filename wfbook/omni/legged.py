@@ -5,14 +5,17 @@ from typing import Any
 import numpy as np
 
 from wfbook.modes import LEGS
+from wfbook.omni.jump import Leap
 from wfbook.omni.robot import WHEEL_RADIUS
 from wfbook.omni.simulate import OmniRun, run
 from wfbook.omni.stride import Gait, margin
-from wfbook.omni.two_modes import RollTo, StepTo, Task
-from wfbook.terrain import Region, Terrain
+from wfbook.omni.two_modes import Jump, RollTo, StepTo, Task
+from wfbook.terrain import Region, Terrain, flat
 
 _SURFACE = {"mu_foot": 0.7, "mu_wheel": 0.0, "mu_wheel_lateral": 0.7, "rolling_resistance": 0.0}
 _HALF_WIDTH = 2.0
+_TOUCHING, _SETTLED = 1.0, 30
+"""Force below which a wheel touches nothing, N; samples after a landing when a miss is measured."""
 FRONT, REAR = ("FL", "FR"), ("RL", "RR")
 
 _BEFORE, _REAR_BEFORE, _BEHIND = 0.03, 0.07, 0.04
@@ -92,6 +95,41 @@ def run_obstacle(
     run_ = run(terrain, over_the_bar(width, gait=gait), **options)
     run_.metrics.update(lifts(run_))
     return run_
+
+
+def run_jump(height: float = 0.08, distance: float = 0.0, **options: Any) -> OmniRun:
+    """Drive, stop, jump, and drive on.
+
+    Args:
+        height: by which the centre of mass rises in the air.
+        distance: ahead.
+        options: of :func:`wfbook.omni.simulate.run`: delay, noise, seed, payload, trunk_mass_scale, …
+    """
+    tasks = [RollTo(0.3), Jump(Leap(height, distance)), RollTo(0.6 + distance)]
+    run_ = run(flat(), tasks, **options)
+    run_.metrics.update(flights(run_))
+    return run_
+
+
+def flights(run_: OmniRun) -> dict[str, Any]:
+    """Return figures of a jump, all in metres and seconds.
+
+    ``flight_s`` is for how long no wheel touched anything; ``com_rise_m`` by how much the centre of mass was
+    higher than at the start, ``wheel_rise_m`` how high the lowest wheel was at best, and ``landing_miss_m``
+    how far the wheels came down from where they should have, along the way, at worst.
+    """
+    flying = ~run_.stance.any(axis=1)
+    free = flying & (run_.contact_force[:, :, 2].max(axis=1) < _TOUCHING)
+    after = np.flatnonzero(flying)[-1] + _SETTLED if flying.any() else 0
+    before = np.flatnonzero(flying)[0] - 1 if flying.any() else 0
+    moved = run_.p[min(after, len(run_.t) - 1), :, 0] - run_.p[before, :, 0]
+    wanted = sum(task["distance"] for task in run_.meta["course"] if "jump" in task)
+    return {
+        "flight_s": float(free.sum() * (run_.t[1] - run_.t[0])),
+        "com_rise_m": float(run_.com[:, 2].max() - run_.com[0, 2]),
+        "wheel_rise_m": float(run_.p[:, :, 2].min(axis=1).max()),
+        "landing_miss_m": float(np.abs(moved - wanted).max()) if flying.any() else None,
+    }
 
 
 def lifts(run_: OmniRun) -> dict[str, Any]:

@@ -16,6 +16,7 @@ import pinocchio as pin
 from wfbook.modes import LEGS
 from wfbook.omni import costs
 from wfbook.omni.costs import Model, Weights
+from wfbook.omni.jump import JUMP_WEIGHTS, Leap, leap_schedule
 from wfbook.omni.locked import NQ_LOCKED, Target, contact_model, held_rows, holding_effort
 from wfbook.omni.problem import OptimalControl
 from wfbook.omni.robot import contact_offsets
@@ -32,7 +33,7 @@ CAREFUL = 0.4
 LANDING = 0.1
 """How long a wheel is still asked to be where it has landed, s."""
 
-_ITERATIONS = (20, 10, 8)
+_ITERATIONS, _LEAP_ITERATIONS = (20, 10, 8), (60, 20, 10)
 """Of the solver, before contact frames and lift-offs are placed anew, and after."""
 
 _UP = np.tile([0.0, 0.0, 1.0], (4, 1))
@@ -204,12 +205,52 @@ def plan_stride(
         if round_ > 0:
             lifted_from = [body.at(motion.xs[swing.first])[0] for swing in asked.swings]
             asked = schedule(target, feet, com, landings, advance, heights, dt, gait, lifted_from)
-        motion.stand(asked.stances)
-        motion.refer([replace(wanted, effort=effort) for wanted in asked.targets])
-        motion.roll()
-        motion.solve(x, count)
-        iterations += motion.solver.iter
+        iterations += pursue(motion, asked, x, effort, count)
     return written(motion, asked, body, iterations, time.perf_counter() - began)
+
+
+def plan_leap(x: np.ndarray, target: Target, leap: Leap, payload: float = 0.0, dt: float = 0.02) -> Plan:
+    """Plan a jump from rest.
+
+    Args:
+        x: ``(41,)`` state in the axes of the commanded base.
+        target: of hand and body.
+        leap: how.
+        payload: in the hand.
+        dt: from node to node.
+
+    Raises:
+        ValueError: a height that is not positive.
+        FloatingPointError: the solution is not finite.
+    """
+    began = time.perf_counter()
+    x = np.array(x)
+    x[21:] = 0.0
+    body = Body(payload)
+    feet, com, _ = body.at(x)
+    asked = leap_schedule(target, feet, com, leap, dt)
+    motion = Motion(len(asked.targets) - 1, dt, JUMP_WEIGHTS, payload=payload)
+    effort = holding_effort(motion.model, x)
+    motion.hold(x)
+    iterations = sum(pursue(motion, asked, x, effort, count) for count in _LEAP_ITERATIONS)
+    return written(motion, asked, body, iterations, time.perf_counter() - began)
+
+
+def pursue(motion: Motion, asked: Schedule, x: np.ndarray, effort: np.ndarray, count: int) -> int:
+    """Solve a motion on for a schedule, contact frames where the last solution touches; return iterations.
+
+    Args:
+        motion: the problem.
+        asked: of it.
+        x: ``(41,)`` first state.
+        effort: ``(14,)`` torques that torques are compared with.
+        count: most iterations.
+    """
+    motion.stand(asked.stances)
+    motion.refer([replace(wanted, effort=effort) for wanted in asked.targets])
+    motion.roll()
+    motion.solve(x, count)
+    return motion.solver.iter
 
 
 def written(motion: Motion, asked: Schedule, body: "Body", iterations: int, solve_time: float) -> Plan:

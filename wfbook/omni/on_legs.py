@@ -35,6 +35,8 @@ _EXPECTED = 0.6
 """Share of a swing after which touching the ground means that the wheel has landed."""
 _LOWERING, _SEARCH = 0.15, 0.8
 """Speed at which a wheel that has not found the ground is lowered, m/s; for how long, s."""
+_INTEGRAL = 1.0
+"""Rate, 1/s, at which the hand's lasting error is taken away."""
 _AWAITED = 4
 """Nodes after which a wheel that is late is expected on the ground."""
 
@@ -161,13 +163,9 @@ class OnLegs(WholeBody):
         ocp.stand(stances)
         keep_landed(ocp, stances, round(LANDING / ocp.dt))
         self.target = targets[0]
-        corrected = self._corrected()
-        off = corrected.hand - self.target.hand
+        off, rotation = self._lasting()
         ocp.refer(
-            [
-                replace(target, hand=target.hand + off, hand_rotation=corrected.hand_rotation)
-                for target in targets
-            ]
+            [replace(target, hand=target.hand + off, hand_rotation=rotation) for target in targets]
         )
         self._warm(x)
         try:
@@ -185,6 +183,22 @@ class OnLegs(WholeBody):
         command.rates[WHEELS_V - 6] = 0.0
         command.stiffness[WHEELS_V - 6], command.damping[WHEELS_V - 6] = BRAKE, BRAKE_DAMPING
         return command
+
+    def _lasting(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return by how much the hand is asked elsewhere ``(3,)``, and how it is asked to be turned ``(3, 3)``.
+
+        On a plan's way nothing approaches slowly: the plan's hand is where it can be. Errors that last are
+        counted as in wheeled mode, but not in flight.
+        """
+        if self._path is None:
+            corrected = self._corrected()
+            return corrected.hand - self.target.hand, corrected.hand_rotation
+        self._goal, hand = None, self._data.oMf[self._hand]
+        if self.standing.any():
+            off = self._offset + PLAN * _INTEGRAL * (self.target.hand - hand.translation)
+            turn = self._turn + PLAN * _INTEGRAL * pin.log3(hand.rotation.T @ self.target.hand_rotation)
+            self._offset, self._turn = np.clip(off, -0.05, 0.05), np.clip(turn, -0.5, 0.5)
+        return self._offset, self.target.hand_rotation @ pin.exp3(self._turn)
 
     def _warm(self, x: np.ndarray) -> None:
         """Begin with the plan, or with the last solution where there is none."""

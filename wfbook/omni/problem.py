@@ -161,13 +161,14 @@ class OptimalControl:
             stances: ``nodes + 1`` of ``(4,)`` bool.
 
         Raises:
-            ValueError: a node in which no wheel stands, or one that lifts a wheel in wheeled mode.
+            ValueError: a node that lifts a wheel in wheeled mode. In legged mode none needs to stand: in flight
+                eq. 4 has no contact rows.
         """
         for node, stance in enumerate(stances):
             stance = tuple(bool(stands) for stands in stance)
             if stance == self._stances[node]:
                 continue
-            if not any(stance) or (self.mode == "wheeled" and not all(stance)):
+            if self.mode == "wheeled" and not all(stance):
                 raise ValueError(f"stances[{node}]: {stance}: too few wheels stand for {self.mode} mode")
             self._stances[node] = stance
             held, dynamics = held_rows(stance), self.actions[node].differential

@@ -15,9 +15,10 @@ from wfbook.modes import LEGS
 from wfbook.omni.base import Base
 from wfbook.omni.controller import FEEDBACK, Command, WholeBody
 from wfbook.omni.costs import Weights
+from wfbook.omni.jump import Leap
 from wfbook.omni.locked import Target, locked_state
 from wfbook.omni.machine import ON_LEGS, Mode, Observed, State, advance
-from wfbook.omni.motion import Body, Plan, plan_stride
+from wfbook.omni.motion import Body, Plan, plan_leap, plan_stride
 from wfbook.omni.on_legs import OnLegs
 from wfbook.omni.robot import STEERS_V, WHEEL_RADIUS, WHEELS_V
 from wfbook.omni.rolling import Axes
@@ -67,7 +68,20 @@ class StepTo:
     gait: Gait = field(default_factory=Gait)
 
 
-Task = Drive | RollTo | StepTo
+@dataclass(frozen=True)
+class Jump:
+    """Jump, in legged mode.
+
+    Attributes:
+        leap: how.
+    """
+
+    leap: Leap = field(default_factory=Leap)
+
+
+Task = Drive | RollTo | StepTo | Jump
+ON_FEET = StepTo | Jump
+"""Tasks for which the wheels are locked."""
 
 _NEAR, _DECELERATION = 0.004, 0.6
 """How near a place is reached, m; and how the robot slows down before it, m/s²."""
@@ -169,7 +183,7 @@ class TwoModes:
 
     @property
     def _wants_legs(self) -> bool:
-        return bool(self._tasks) and isinstance(self._tasks[0], StepTo)
+        return bool(self._tasks) and isinstance(self._tasks[0], ON_FEET)
 
     def _observed(self, qpos: np.ndarray, qvel: np.ndarray) -> Observed:
         base = self.wheels.base
@@ -198,8 +212,8 @@ class TwoModes:
             return np.asarray(task.twist, dtype=float)
         if isinstance(task, RollTo) and self.machine.mode == Mode.WHEELED:
             return self._roll_to(task)
-        if isinstance(task, StepTo) and self.machine.mode == Mode.LEGGED:
-            self._step_to(task, qpos, qvel)
+        if isinstance(task, ON_FEET) and self.machine.mode == Mode.LEGGED:
+            self._on_feet(task, qpos, qvel)
         return np.zeros(3)
 
     def _next(self) -> None:
@@ -218,8 +232,8 @@ class TwoModes:
         speed = min(task.speed, np.sqrt(2.0 * _DECELERATION * abs(missing)), 4.0 * abs(missing))
         return np.array([np.sign(missing) * speed, 0.0, 0.0])
 
-    def _step_to(self, task: StepTo, qpos: np.ndarray, qvel: np.ndarray) -> None:
-        """Plan a stride once the robot is in legged mode, and see it through."""
+    def _on_feet(self, task: StepTo | Jump, qpos: np.ndarray, qvel: np.ndarray) -> None:
+        """Plan a motion once the robot is in legged mode, and see it through."""
         if self._begun and self.legs.finished:
             self._arrive(qpos, qvel)
             self._next()
@@ -228,14 +242,14 @@ class TwoModes:
             try:
                 plan = self._planned(task, qpos, qvel)
             except (ValueError, FloatingPointError) as error:
-                self.trouble = f"no stride: {error}"
+                self.trouble = f"no plan: {error}"
                 return
             self.plans.append(plan)
             self.legs.begin(plan)
         self.trouble = self.trouble or self.legs.trouble
 
-    def _planned(self, task: StepTo, qpos: np.ndarray, qvel: np.ndarray) -> Plan:
-        """Return the plan of a stride from where the robot stands.
+    def _planned(self, task: StepTo | Jump, qpos: np.ndarray, qvel: np.ndarray) -> Plan:
+        """Return the plan of a motion from where the robot stands.
 
         Raises:
             ValueError: there is none that the robot can follow.
@@ -243,6 +257,10 @@ class TwoModes:
         """
         axes = Axes(self.wheels.base.state)
         x = axes.state(locked_state(qpos, qvel))
+        if isinstance(task, Jump):
+            plan = plan_leap(x, self.rolling.target, task.leap, self.payload)
+            check(plan)
+            return plan
         feet = Body().at(x)[0]
 
         def heights(points: np.ndarray) -> np.ndarray:
@@ -318,3 +336,5 @@ def describe(task: Task) -> dict[str, Any]:
             return {"roll_to": float(task.x), "legs": list(task.legs), "speed": float(task.speed)}
         case StepTo():
             return {"step_to": {leg: float(x) for leg, x in task.x.items()}}
+        case Jump():
+            return {"jump": float(task.leap.height), "distance": float(task.leap.distance)}
