@@ -16,7 +16,7 @@ import pinocchio as pin
 
 from wfbook.modes import LEGS
 from wfbook.omni.base import Base
-from wfbook.omni.controller import PLAN, Command, WholeBody
+from wfbook.omni.controller import FEEDBACK, PLAN, Command, WholeBody
 from wfbook.omni.costs import Weights
 from wfbook.omni.locked import NQ_LOCKED, Target, holding_effort
 from wfbook.omni.motion import CAREFUL, LANDING, Plan, keep_landed
@@ -35,6 +35,8 @@ _EXPECTED = 0.6
 """Share of a swing after which touching the ground means that the wheel has landed."""
 _LOWERING, _SEARCH = 0.15, 0.8
 """Speed at which a wheel that has not found the ground is lowered, m/s; for how long, s."""
+_SHARE, _LANDED_SHARE = 0.05, 0.5
+"""Of the motors' own loops: beside the gains of a plan, and without them after a jump's landing."""
 _INTEGRAL = 1.0
 """Rate, 1/s, at which the hand's lasting error is taken away."""
 _AWAITED = 4
@@ -50,6 +52,8 @@ class Path:
         stances: ``(4,)`` bool each.
         xs: states ``(41,)``.
         us: torques ``(14,)``.
+        K: gains ``(14, 40)`` of the plan.
+        flies: whether there are steps in which no wheel stands.
         swings: leg, first step in the air, first step on the ground.
     """
 
@@ -57,6 +61,8 @@ class Path:
     stances: list[tuple[bool, ...]]
     xs: list[np.ndarray]
     us: list[np.ndarray]
+    K: list[np.ndarray]
+    flies: bool
     swings: list[tuple[int, int, int]]
 
 
@@ -64,7 +70,7 @@ def path_of(plan: Plan, model: pin.Model, step: float = PLAN) -> Path:
     """Return a plan's references at a controller's time steps."""
     asked = plan.schedule
     fine = round(asked.dt / step)
-    targets, stances, xs, us = [], [], [], []
+    targets, stances, xs, us, K = [], [], [], [], []
     last = len(asked.targets) - 1
     for k in range(last * fine + 1):
         node, share = divmod(k, fine)
@@ -89,8 +95,10 @@ def path_of(plan: Plan, model: pin.Model, step: float = PLAN) -> Path:
         velocity = velocity + share * (plan.xs[after][NQ_LOCKED:] - velocity)
         xs.append(np.concatenate([q, velocity]))
         us.append(plan.us[effort])
+        K.append(plan.K[effort])
     swings = [(swing.leg, swing.first * fine, swing.last * fine) for swing in asked.swings]
-    return Path(targets, stances, xs, us, swings)
+    flies = not all(any(stance) for stance in stances)
+    return Path(targets, stances, xs, us, K, flies, swings)
 
 
 class OnLegs(WholeBody):
@@ -128,7 +136,7 @@ class OnLegs(WholeBody):
         self.finished = True
         self._rest = self.target
         self._path: Path | None = None
-        self._k, self._late = 0, 0.0
+        self._k, self._at, self._late = 0, 0, 0.0
         self._landed: set[int] = set()
         self._locked = np.zeros(4), np.zeros(4)
 
@@ -147,9 +155,41 @@ class OnLegs(WholeBody):
         self._path, self._rest, self.target, self.finished = None, target, target, True
         self.standing = np.ones(4, bool)
 
+    def tick(self, qpos: np.ndarray, qvel: np.ndarray, wanted: np.ndarray) -> Command:
+        """Return the command for the next 2 ms; see :meth:`WholeBody.tick`.
+
+        A jump is over before a receding horizon has found its way from push to flight: its plan is followed by
+        its own gains, those of the whole motion (Paper B, eq. 21). They hold until the wheels are felt, or should
+        be; then motors hold the planned joint motion. For gains that take four wheels to stand ask for forces
+        from wheels that hop.
+        """
+        if self._path is None or not self._path.flies:
+            return super().tick(qpos, qvel, wanted)
+        x, axes = self._seen(qpos, qvel, wanted)
+        self._since += FEEDBACK
+        if self._since >= PLAN - 1e-9:
+            self._since = 0.0
+            places, normals = self._roll(x, qpos[1 + STEERS_V], axes)
+            self.ocp.place_contacts(x, qpos[1 + STEERS_V], normals)
+            stances, targets = self._asked(x, places)
+            self.ocp.stand(stances)
+            self.target = targets[0]
+        late = round(self.delay / FEEDBACK)
+        if late and len(self._sent) >= late:
+            x = self.ocp.predict(x, np.mean(list(self._sent)[-late:], axis=0), self.delay)
+        path, state = self._path, self.ocp.state
+        k = self._at
+        share, after = self._since / PLAN, min(k + 1, len(path.xs) - 1)
+        planned = state.integrate(path.xs[k], share * state.diff(path.xs[k], path.xs[after]))
+        landed = k >= path.swings[0][2]
+        torques = path.us[k] if landed else path.us[k] + path.K[k] @ state.diff(planned, x)
+        self._sent.append(torques)
+        share = _LANDED_SHARE if landed else _SHARE
+        return self._command(planned[7:NQ_LOCKED], planned[27:], torques, share, np.zeros(4))
+
     def _weigh(self, x: np.ndarray) -> None:
-        """Correct the payload while all wheels stand: steps shake the arm for other reasons."""
-        if self.standing.all():
+        """Correct the payload at rest only: steps shake the arm for other reasons."""
+        if self._path is None:
             super()._weigh(x)
         else:
             self._before = None
@@ -183,6 +223,16 @@ class OnLegs(WholeBody):
         command.rates[WHEELS_V - 6] = 0.0
         command.stiffness[WHEELS_V - 6], command.damping[WHEELS_V - 6] = BRAKE, BRAKE_DAMPING
         return command
+
+    def _landed_from_flight(self, k: int) -> int:
+        """Return the step of a jump's plan that is due: a landing that comes early takes it there at once.
+
+        One that is late is not waited for. In the plan's gains the wheels keep to places in the world, and a
+        robot that falls lower than planned would draw its legs up.
+        """
+        _, first, landing = self._path.swings[0]
+        expected = first + _EXPECTED * (landing - first)
+        return landing if expected < k < landing and self.felt.sum() >= 2 else k
 
     def _lasting(self) -> tuple[np.ndarray, np.ndarray]:
         """Return by how much the hand is asked elsewhere ``(3,)``, and how it is asked to be turned ``(3, 3)``.
@@ -218,11 +268,14 @@ class OnLegs(WholeBody):
             rest = replace(self._rest, com=self._rest.com + up, effort=holding_effort(self.ocp.model, x))
             return [(True,) * 4] * count, [rest] * count
         k, last = self._k, len(path.targets) - 1
+        if path.flies:
+            k = self._landed_from_flight(k)
+        self._at = k
         stances = np.array([path.stances[min(k + j, last)] for j in range(count)])
         targets = [path.targets[min(k + j, last)] for j in range(count)]
         waiting = False
         for leg, first, landing in path.swings:
-            if not first <= k < landing:
+            if path.flies or not first <= k < landing:
                 continue
             if k == first:
                 self._landed.discard(leg)
