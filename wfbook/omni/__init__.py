@@ -7,6 +7,8 @@ that does it. Chapter 10: :mod:`.wrench` is what one contact can do, :mod:`.supp
 :mod:`.ddp` is the method in plain NumPy, for the :mod:`.systems` that it is shown on; for the robot itself
 :mod:`.locked` has its 41 states, :mod:`.costs` the terms of the cost, and :mod:`.problem` the optimal
 control problem in Crocoddyl. Chapter 12: :mod:`.waves` is the terrain, :mod:`.rolling` keeps the wheels to a
-commanded base, :mod:`.controller` is whole-body control and what paper B compares itself with, and
-:mod:`.simulate` the runs.
+commanded base, :mod:`.controller` is whole-body control and what paper B compares itself with. For legged
+mode :mod:`.stride` and :mod:`.jump` say what is asked of steps and jumps, :mod:`.motion` plans them, and
+:mod:`.on_legs` follows the plan; :mod:`.machine` changes between the modes and :mod:`.two_modes` carries out
+tasks. :mod:`.simulate` has the runs, and :mod:`.legged` those that need legs.
 """

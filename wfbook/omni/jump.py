@@ -1,8 +1,8 @@
 """Chapter 12: a jump: crouch, push off, fly, land, stand (Paper B, eqs 4 and 5).
 
-In the air no wheel stands, eq. 4 has no contact rows left, and the centre of mass goes as gravity wants it. What
-it is asked to do is therefore a parabola, with a push and a landing of the same constant acceleration before and
-after. Wheels are drawn up and put down again; locked, as in every other step.
+In the air no wheel stands, eq. 4 has no contact rows left, and the centre of mass goes as gravity wants it.
+What it is asked to do is therefore a parabola, with a push and a landing of the same constant acceleration
+before and after. Wheels are drawn up and put down again; locked, as in every other step.
 """
 
 from dataclasses import dataclass, replace
@@ -112,7 +112,7 @@ def leap_schedule(target: Target, feet: np.ndarray, com: np.ndarray, leap: Leap,
             replace(
                 target,
                 hand=target.hand + hand,
-                com=com + [moved[0], 0.0, moved[1]],
+                com=com + np.array([moved[0], 0.0, moved[1]]),
                 feet=feet + ease(flown) * ahead + lift,
             )
         )

@@ -133,10 +133,10 @@ def flights(run_: OmniRun) -> dict[str, Any]:
 
 
 def lifts(run_: OmniRun) -> dict[str, Any]:
-    """Return figures of a run's steps: the smallest margin of each lift, and how long a wheel was in the air.
+    """Return figures of a run's steps: the smallest margin of each lift, and the time in the air.
 
-    The margin is the distance of the centre of mass to the nearest edge of the triangle of the wheels that the
-    controller takes to stand, in metres.
+    The margin is the distance of the centre of mass to the nearest edge of the triangle of the wheels that
+    the controller takes to stand, in metres.
     """
     margins, airtime = {}, {}
     for leg, name in enumerate(LEGS):

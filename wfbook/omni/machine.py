@@ -1,9 +1,9 @@
-"""Chapter 12: the mode state machine: which of two modes the robot is in, and when it may change (Paper B, Fig. 5).
+"""Chapter 12: the mode state machine: which mode the robot is in, and when it may change (Paper B, Fig. 5).
 
 A task says which mode it needs. The machine gets there safely: before wheels are locked the base must be at
-rest, with its wheels steered straight ahead, and brakes must have closed; before they roll again all four must
-stand and the trunk be at rest. Nothing here knows how the robot moves: :func:`advance` is a pure function of
-the mode, what the task needs, and what is observed. Wheel kinematics have no modes at all.
+rest, with its wheels steered straight ahead, and brakes must have closed; before they roll again all four
+must stand and the trunk be at rest. Nothing here knows how the robot moves: :func:`advance` is a pure
+function of the mode, what the task needs, and what is observed. Wheel kinematics have no modes at all.
 """
 
 from dataclasses import dataclass

@@ -1,8 +1,8 @@
-"""Chapter 12: a whole motion as one optimal control problem, wheels locked and lifted (Paper B, eqs 4, 5 and 16).
+"""Chapter 12: a whole motion as one optimal control problem, wheels locked (Paper B, eqs 4, 5 and 16).
 
-A locked wheel still rolls a little: with its shank. Over a stride the shank turns by half a radian and the place
-where it touches goes on by some centimetres, so each node has contact frames of its own. They are placed where
-the wheels touch in the last solution, and the problem is solved again.
+A locked wheel still rolls a little: with its shank. Over a stride the shank turns by half a radian and the
+place where it touches goes on by some centimetres, so each node has contact frames of its own. They are
+placed where the wheels touch in the last solution, and the problem is solved again.
 """
 
 import time
@@ -28,7 +28,7 @@ STRIDE_WEIGHTS = Weights(
 """Of a stride: posture leads less, for legs have to stretch; wheels keep to their paths."""
 
 CAREFUL = 0.4
-"""Friction coefficient that steps reckon with: less than there is, for a wheel that slips is lost to the plan."""
+"""Friction coefficient that steps reckon with: less than there is, for a wheel that slips is lost."""
 
 LANDING = 0.1
 """How long a wheel is still asked to be where it has landed, s."""

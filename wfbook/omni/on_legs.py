@@ -1,12 +1,12 @@
-"""Chapter 12: the controller of legged mode: a planned stride, followed by a receding horizon (Paper B, Fig. 5).
+"""Chapter 12: the controller of legged mode: a planned stride, and a receding horizon (Paper B, Fig. 5).
 
 Steering and wheels are locked: brakes hold the angles in which they were locked. The whole stride is planned
 while the robot stands (:mod:`.motion`). Then the problem of a short horizon is solved again and again as in
-wheeled mode (:mod:`.controller`), with the plan for a reference, and the torques follow its gains. Each solution
-begins with the plan: in one iteration the last solution would not find which wheels carry next.
+wheeled mode (:mod:`.controller`), with the plan for a reference, and the torques follow its gains. Each
+solution begins with the plan: in one iteration the last solution would not find which wheels carry next.
 
-A wheel that swings is one that stands as soon as it is felt to touch late in its swing. If it is not felt when
-it should, the stride waits for it and the wheel is lowered.
+A wheel that swings is one that stands as soon as it is felt to touch late in its swing. If it is not felt
+when it should, the stride waits for it and the wheel is lowered.
 """
 
 from dataclasses import dataclass, replace
@@ -34,7 +34,7 @@ LEGGED_WEIGHTS = Weights(leg=1e5, com=(1e4, 1e4, 5e3), posture=1.0, contact=0.1,
 _EXPECTED = 0.6
 """Share of a swing after which touching the ground means that the wheel has landed."""
 _LOWERING, _SEARCH = 0.15, 0.8
-"""Speed at which a wheel that has not found the ground is lowered, m/s; for how long, s."""
+"""Speed at which a wheel that has not found the ground is lowered, m/s; and for how long, s."""
 _SHARE, _LANDED_SHARE = 0.05, 0.5
 """Of the motors' own loops: beside the gains of a plan, and without them after a jump's landing."""
 _INTEGRAL = 1.0
@@ -158,10 +158,10 @@ class OnLegs(WholeBody):
     def tick(self, qpos: np.ndarray, qvel: np.ndarray, wanted: np.ndarray) -> Command:
         """Return the command for the next 2 ms; see :meth:`WholeBody.tick`.
 
-        A jump is over before a receding horizon has found its way from push to flight: its plan is followed by
-        its own gains, those of the whole motion (Paper B, eq. 21). They hold until the wheels are felt, or should
-        be; then motors hold the planned joint motion. For gains that take four wheels to stand ask for forces
-        from wheels that hop.
+        A jump is over before a receding horizon has found its way from push to flight: its plan is followed
+        by its own gains, those of the whole motion (Paper B, eq. 21). They hold until the wheels are felt, or
+        should be; then motors hold the planned joint motion. For gains that take four wheels to stand ask
+        for forces from wheels that hop.
         """
         if self._path is None or not self._path.flies:
             return super().tick(qpos, qvel, wanted)
@@ -204,9 +204,7 @@ class OnLegs(WholeBody):
         keep_landed(ocp, stances, round(LANDING / ocp.dt))
         self.target = targets[0]
         off, rotation = self._lasting()
-        ocp.refer(
-            [replace(target, hand=target.hand + off, hand_rotation=rotation) for target in targets]
-        )
+        ocp.refer([replace(target, hand=target.hand + off, hand_rotation=rotation) for target in targets])
         self._warm(x)
         try:
             ocp.solve(x, 1)
@@ -235,7 +233,7 @@ class OnLegs(WholeBody):
         return landing if expected < k < landing and self.felt.sum() >= 2 else k
 
     def _lasting(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return by how much the hand is asked elsewhere ``(3,)``, and how it is asked to be turned ``(3, 3)``.
+        """Return by how much the hand is asked elsewhere ``(3,)``, and how it is to be turned ``(3, 3)``.
 
         On a plan's way nothing approaches slowly: the plan's hand is where it can be. Errors that last are
         counted as in wheeled mode, but not in flight.

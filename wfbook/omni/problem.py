@@ -161,8 +161,8 @@ class OptimalControl:
             stances: ``nodes + 1`` of ``(4,)`` bool.
 
         Raises:
-            ValueError: a node that lifts a wheel in wheeled mode. In legged mode none needs to stand: in flight
-                eq. 4 has no contact rows.
+            ValueError: a node that lifts a wheel in wheeled mode. In legged mode none needs to stand: in
+                flight eq. 4 has no contact rows.
         """
         for node, stance in enumerate(stances):
             stance = tuple(bool(stands) for stands in stance)

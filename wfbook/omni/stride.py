@@ -1,9 +1,9 @@
-"""Chapter 12: steps of legged mode: where the centre of mass must be, how a wheel swings, when (Paper B, Fig. 5).
+"""Chapter 12: steps of legged mode: where the centre of mass must be, how a wheel swings (Paper B, Fig. 5).
 
 The legs have no abduction: the centre of mass can be shifted along the robot, and across only as far as the
-trunk rolls. A wheel is lifted when the centre of mass is inside the triangle of the other three, away from its
-edges. With the wheels below the hips the diagonal is the edge that matters, so the robot leans back before a
-front wheel steps, and ahead before a rear one does.
+trunk rolls. A wheel is lifted when the centre of mass is inside the triangle of the other three, away from
+its edges. With the wheels below the hips the diagonal is the edge that matters, so the robot leans back
+before a front wheel steps, and ahead before a rear one does.
 
 Coordinates are those of the commanded base: x ahead, the origin on the ground.
 """
@@ -22,7 +22,7 @@ Heights = Callable[[np.ndarray], np.ndarray]
 """From points ``(n, 3)`` to the ground's heights there ``(n,)``."""
 
 _RISE, _CROSS, _DONE = 0.35, (0.2, 0.8), 0.92
-"""Share of a swing in which a wheel rises and, at its end, sinks; in which it crosses; and when it has arrived."""
+"""Share of a swing in which a wheel rises and, at its end, sinks; in which it crosses; when it arrives."""
 
 _SINK = 0.15
 """Share of a stride in which the trunk sinks, and rises again."""
@@ -97,7 +97,8 @@ def swing_path(start: np.ndarray, end: np.ndarray, apex: float, share: np.ndarra
     """Return where an axle is ``(n, 3)``: up, across, down, and at rest before the time is over.
 
     Args:
-        start, end: ``(3,)``.
+        start: ``(3,)``.
+        end: ``(3,)``.
         apex: height of the axle while it crosses.
         share: ``(n,)`` of the time, 0 to 1.
     """

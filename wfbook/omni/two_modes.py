@@ -20,6 +20,7 @@ from wfbook.omni.locked import Target, locked_state
 from wfbook.omni.machine import ON_LEGS, Mode, Observed, State, advance
 from wfbook.omni.motion import Body, Plan, plan_leap, plan_stride
 from wfbook.omni.on_legs import OnLegs
+from wfbook.omni.problem import OptimalControl
 from wfbook.omni.robot import STEERS_V, WHEEL_RADIUS, WHEELS_V
 from wfbook.omni.rolling import Axes
 from wfbook.omni.stride import Gait
@@ -150,9 +151,9 @@ class TwoModes:
         return self.legs.standing if self.machine.mode in ON_LEGS else np.ones(4, bool)
 
     @property
-    def payload(self) -> float:
-        """Mass in the hand as it was weighed."""
-        return self.driver.ocp.payload
+    def ocp(self) -> OptimalControl:
+        """The problem that is solved now."""
+        return self.driver.ocp
 
     @property
     def done(self) -> bool:
@@ -258,7 +259,7 @@ class TwoModes:
         axes = Axes(self.wheels.base.state)
         x = axes.state(locked_state(qpos, qvel))
         if isinstance(task, Jump):
-            plan = plan_leap(x, self.rolling.target, task.leap, self.payload)
+            plan = plan_leap(x, self.rolling.target, task.leap, self.ocp.payload)
             check(plan)
             return plan
         feet = Body().at(x)[0]
@@ -275,7 +276,7 @@ class TwoModes:
             moved[i] = end[0] - feet[i, 0]
             landings.append((i, end))
         forward = np.array([moved.mean(), 0.0])
-        plan = plan_stride(x, self.rolling.target, landings, forward, heights, self.payload, task.gait)
+        plan = plan_stride(x, self.rolling.target, landings, forward, heights, self.ocp.payload, task.gait)
         check(plan)
         return plan
 
