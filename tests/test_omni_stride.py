@@ -89,8 +89,9 @@ def test_a_schedule_lifts_one_wheel_at_a_time_and_ends_as_it_began():
     assert len(asked.swings) == 4
     last = asked.targets[-1]
     np.testing.assert_allclose(last.feet, ends)
-    np.testing.assert_allclose(last.com, target.com + [0.3, 0.0, 0.0], atol=1e-9)
-    np.testing.assert_allclose(last.hand, target.hand + [0.3, 0.0, 0.0], atol=1e-9)
+    ahead = np.array([0.3, 0.0, 0.0])
+    np.testing.assert_allclose(last.com, target.com + ahead, atol=1e-9)
+    np.testing.assert_allclose(last.hand, target.hand + ahead, atol=1e-9)
     for swing in asked.swings:
         com = asked.targets[swing.first].com
         standing = asked.targets[swing.first].feet
