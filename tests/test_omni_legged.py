@@ -55,9 +55,10 @@ def test_wheels_are_lifted_in_legged_mode_alone_and_one_at_a_time(over):
     lifted = ~over.stance
     assert lifted.sum(axis=1).max() == 1
     assert np.all(over.mode[lifted.any(axis=1)] == Mode.LEGGED)
-    # What is taken to be in the air carries nothing, but at its ends.
-    inside = lifted & np.roll(lifted, 8, axis=0) & np.roll(lifted, -8, axis=0)
-    assert over.contact_force[inside][:, 2].max() < 1.0
+    # What is taken to be in the air carries nothing. At the end it may brush the ground before it is felt.
+    inside = lifted & np.roll(lifted, 30, axis=0) & np.roll(lifted, -30, axis=0)
+    assert over.contact_force[inside][:, 2].max() == 0.0
+    assert over.contact_force[lifted][:, 2].max() < 60.0
     for leg in range(4):
         assert lifted[:, leg].sum() > 60
         assert over.p[lifted[:, leg], leg, 2].max() > 0.1
