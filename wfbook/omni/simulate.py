@@ -312,7 +312,7 @@ class _Loop:
             if self.noise is not None:
                 qpos, qvel = self.noise.disturb(qpos, qvel, self.rng)
             if self._tasks is not None:
-                self._tasks.felt = felt
+                self._tasks.felt, self._tasks.waiting = felt, t < 0.0
             began = time.perf_counter()
             self.command = self.driver.tick(qpos, qvel, wanted)
             self.times.append(time.perf_counter() - began)

@@ -105,7 +105,8 @@ class TwoModes:
     Attributes:
         machine: its state.
         felt: ``(4,)`` bool, which wheels were felt to touch when the state was measured.
-        plans: strides that were planned.
+        waiting: whether the robot still settles, and no task begins.
+        plans: motions that were planned.
         trouble: what went wrong, if anything.
     """
 
@@ -124,6 +125,7 @@ class TwoModes:
         self.ground, self.delay = ground, delay
         self.machine = State()
         self.felt = np.ones(4, bool)
+        self.waiting = False
         self.plans: list[Plan] = []
         self.trouble: str | None = None
         self._tasks = list(tasks)
@@ -184,7 +186,7 @@ class TwoModes:
 
     @property
     def _wants_legs(self) -> bool:
-        return bool(self._tasks) and isinstance(self._tasks[0], ON_FEET)
+        return bool(self._tasks) and not self.waiting and isinstance(self._tasks[0], ON_FEET)
 
     def _observed(self, qpos: np.ndarray, qvel: np.ndarray) -> Observed:
         base = self.wheels.base
@@ -200,15 +202,16 @@ class TwoModes:
 
     def _perform(self, qpos: np.ndarray, qvel: np.ndarray) -> np.ndarray:
         """Go on with the present task, and from one to the next; return the twist that it wants."""
-        if not self._tasks:
+        if not self._tasks or self.waiting:
             return np.zeros(3)
         task = self._tasks[0]
         self._for += FEEDBACK
         if self._for > _PATIENCE:
             self.trouble = f"a task takes longer than {_PATIENCE:.0f} s: {type(task).__name__}"
         if isinstance(task, Drive) and self.machine.mode == Mode.WHEELED:
-            self._begun = True
-            if self._for > task.duration:
+            if not self._begun:  # the time in which modes changed does not count
+                self._begun, self._for = True, 0.0
+            if self._for > task.duration - 1e-9:
                 self._next()
             return np.asarray(task.twist, dtype=float)
         if isinstance(task, RollTo) and self.machine.mode == Mode.WHEELED:
