@@ -142,7 +142,7 @@ def test_a_course_may_hold_twists_among_tasks(tmp_path):
     mixed = run(flat(), [(0.5, [0.3, 0.0, 0.0]), RollTo(0.3), (0.3, [0.0, 0.0, 0.5])])
     assert mixed.metrics["finished"]
     assert mixed.pose[-1, 0] == pytest.approx(0.3, abs=0.01)
-    assert mixed.pose[-1, 2] > 0.05
+    assert mixed.pose[-1, 2] > 0.02  # the wheels steer first
     assert mixed.meta["course"][1] == {"roll_to": 0.3, "legs": list(LEGS), "speed": 0.4}
     mixed.save(tmp_path / "run.npz")
     back = OmniRun.load(tmp_path / "run.npz")
