@@ -33,7 +33,6 @@ from wfbook.omni.robot import (
     STIFFNESS,
     WHEEL_RADIUS,
     WHEELS_V,
-    contact_offsets,
 )
 from wfbook.omni.rolling import Axes, Wheels
 from wfbook.omni.waves import Ground
@@ -107,16 +106,16 @@ class OnWheels:
         return axes.state(locked_state(qpos, qvel)), axes
 
     def _roll(self, x: np.ndarray, steering: np.ndarray, axes: Axes) -> tuple[np.ndarray, np.ndarray]:
-        """Set the wheels' rates; return their contacts and the ground's normals, ``(4, 3)``, in the axes."""
+        """Set the wheels' rates; return their middles and the ground's normals, ``(4, 3)``, in the axes."""
         pin.framesForwardKinematics(self.model, self._data, x[:NQ_LOCKED])
-        centres = np.array([self._data.oMf[i].translation for i in self._axles])
-        _, normals = self.ground.below(centres @ axes.R.T + axes.origin)
-        normals = normals @ axes.R
+        middles = np.array([self._data.oMf[i].translation for i in self._axles])
         turns = zip(self._axles, steering, strict=True)
-        axles = [self._data.oMf[i].rotation @ [-np.sin(angle), np.cos(angle), 0.0] for i, angle in turns]
-        places = centres + contact_offsets(np.array(axles), normals)
-        self._rates = self.wheels.command(places, normals)
-        return places, normals
+        along = np.array([self._data.oMf[i].rotation[:2] @ [np.cos(a), np.sin(a), 0.0] for i, a in turns])
+        along = along / np.linalg.norm(along, axis=1, keepdims=True) @ axes.R[:2, :2].T
+        _, normals = self.ground.ride((middles @ axes.R.T + axes.origin)[:, :2], along)
+        normals = normals @ axes.R
+        self._rates = self.wheels.command(middles, normals)
+        return middles, normals
 
     def _command(
         self, angles: np.ndarray, rates: np.ndarray, torques: np.ndarray, share: float, push: np.ndarray
@@ -190,6 +189,7 @@ class WholeBody(OnWheels):
         late = round(self.delay / FEEDBACK)
         if late and len(self._sent) >= late:
             x = self.ocp.predict(x, np.mean(list(self._sent)[-late:], axis=0), self.delay)
+            axes = Axes(self.wheels.base.state)  # they have gone along meanwhile
         if due:
             self._plan(x, qpos[1 + STEERS_V], axes)
             self._since = 0.0
@@ -218,18 +218,30 @@ class WholeBody(OnWheels):
     def _plan(self, x: np.ndarray, steering: np.ndarray, axes: Axes) -> None:
         """Solve the problem on from its last solution, one iteration."""
         ocp = self.ocp
-        places, normals = self._roll(x, steering, axes)
+        middles, normals = self._roll(x, steering, axes)
         ocp.place_contacts(x, steering, normals)
-        up = np.array([0.0, 0.0, places[:, 2].mean()])
-        target = replace(self._corrected(), com=self.target.com + up, effort=holding_effort(ocp.model, x))
-        ocp.refer([target] * (ocp.nodes + 1))
+        heights = self._heights(middles)
         ocp.shift()
+        ocp.roll(self.wheels.velocities(middles, heights, ocp.dt))
+        target = replace(self._corrected(), effort=holding_effort(ocp.model, x))
+        rises = middles[:, 2].mean() - WHEEL_RADIUS + (heights[1:-1] - heights[1]).mean(axis=1)
+        coms = self.target.com + rises[:, None] * np.array([0.0, 0.0, 1.0])
+        ocp.refer([replace(target, com=com) for com in coms])
         try:
             ocp.solve(x, 1)
             self.solved = True
         except FloatingPointError:
             self.solved = False
         self._push = WHEEL_RADIUS * ocp.forces(0)[:, 0]
+
+    def _heights(self, middles: np.ndarray) -> np.ndarray:
+        """Return how high the wheels' middles will be over the ground ahead, ``(nodes + 3, 4)``.
+
+        The first row is a time step ago.
+        """
+        times = self.ocp.dt * np.arange(-1, self.ocp.nodes + 2)
+        places, along = self.wheels.ahead(middles, times)
+        return self.ground.ride(places.reshape(-1, 2), along.reshape(-1, 2))[0].reshape(-1, 4)
 
     def _corrected(self) -> Target:
         """Return the target, approached at no more than a given speed, with the hand's lasting error counted.
