@@ -45,7 +45,7 @@ FRICTION = 0.7
 _SETTLING, _ROLLING = 20.0, 10.0
 """Rates, 1/s, at which contacts come to the velocity that they should have: those of locked wheels, which is
 none, and of rolling ones."""
-_THREAD = 1e-9
+_THREAD = 1e-12
 """Stiffness, 1/s², with which a rolling contact is drawn to a point so far away that the draught is even:
 Crocoddyl has no other way to give a contact an acceleration."""
 
