@@ -137,11 +137,12 @@ class Ground:
         samples = places[:, None] + _TREAD[:, None] * along[:, None]
         heights = self.below(samples.reshape(-1, 2))[0].reshape(len(places), -1)
         clear = heights + np.sqrt(WHEEL_RADIUS**2 - _TREAD**2)
-        # The highest of the parabola through the highest sample and its neighbours.
-        best, each = np.clip(clear.argmax(axis=1), 1, len(_TREAD) - 2), np.arange(len(places))
-        before, at, after = (clear[each, best + i] for i in (-1, 0, 1))
-        bend = np.minimum(before - 2.0 * at + after, -1e-12)
-        shift = np.clip(0.5 * (before - after) / bend, -1.0, 1.0)
+        # The top of the parabola through the highest sample and its neighbours, if it has both.
+        best, each = clear.argmax(axis=1), np.arange(len(places))
+        before, at, after = (clear[each, np.clip(best + i, 0, len(_TREAD) - 1)] for i in (-1, 0, 1))
+        shift = np.where(
+            (before < at) & (after < at), 0.5 * (before - after) / (before - 2 * at + after), 0.0
+        )
         ahead = np.interp(best + shift, np.arange(len(_TREAD)), _TREAD)
         middles = at + 0.25 * (after - before) * shift
         touch = places + ahead[:, None] * along
