@@ -34,7 +34,7 @@ class Weights:
         trunk: ``(3,)`` of roll, pitch, yaw.
         posture: of the legs' joints.
         arm_posture: of the arm's joints.
-        velocity: of all generalised velocities.
+        velocity: of all generalised velocities, less those that go along with the ground.
         hand: ``(3,)`` of the hand's position.
         hand_rotation: of its orientation.
         limits: of joints outside their range.
