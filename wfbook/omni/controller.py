@@ -5,8 +5,8 @@ iteration. Every :data:`FEEDBACK` the torques follow the gains of that solution 
 simulation motors add a weak PD loop of their own on the planned joint motion, from their own encoders.
 
 The problem is stated in the axes of the commanded base (:mod:`.rolling`), and the wheels follow that base.
-It knows the ground ahead: how high each wheel will ride in every node, and how fast it will rise. Without that
-a horizon of 0.4 s takes the slope of now for the ground of then, and on seven waves at 1 m/s the robot falls.
+It knows the ground ahead: how high each wheel will ride in every node, and how fast it rises. Without that a
+horizon of 0.4 s takes the slope of now for the ground of then, and on seven waves at 1 m/s the robot falls.
 """
 
 from collections import deque
