@@ -45,7 +45,7 @@ def test_looking_up_finds_what_the_terrain_says(terrain):
 
 
 def test_over_no_region_the_ground_is_level():
-    heights, normals = Ground(waves(3)).below(np.array([[50.0, 0.0], [0.3, 2.5], [-1.7, 0.0]]))
+    heights, normals = Ground(waves(3)).below(np.array([[50.0, 0.0], [0.3, 2.5], [-1.7, 0.0], [np.nan, 0.0]]))
     assert np.all(heights == 0.0) and np.all(normals == [0.0, 0.0, 1.0])
 
 

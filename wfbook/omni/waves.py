@@ -105,9 +105,9 @@ class Ground:
             points: ``(n, 2)`` or ``(n, 3)``, x and y first.
         """
         points = np.asarray(points, dtype=float)[:, :2]
-        cells = ((points - self._low) // self._cell).astype(int)
+        cells = (points - self._low) // self._cell
         inside = ((cells >= 0) & (cells < self._shape)).all(axis=1)
-        rows = np.where(inside, cells[:, 0] * self._shape[1] + cells[:, 1], -1)
+        rows = np.where(inside, cells @ [self._shape[1], 1], -1).astype(int)
         near = self._regions[rows]
         x, y, over = points[:, :1], points[:, 1:], near >= 0
         for a, b, c in self._rows:
