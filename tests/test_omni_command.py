@@ -176,6 +176,7 @@ REFUSED |= {
     "too fast": (["run", "omni-waves", "--speed", "3"], "--speed: must be at most 2"),
     "negative payload": (["run", "omni-waves", "--payload", "-1"], "--payload: must be at least 0"),
     "no trunk": (["run", "omni-waves", "--trunk-scale", "0"], "--trunk-scale: must be above 0"),
+    "an arm alone on legs": (["run", "omni-jump", "--controller", "ik-true"], "ik-true has no legged mode"),
     "unknown controller": (["run", "omni-waves", "--controller", "lqr"], "'lqr'"),
     "unknown state": (["run", "omni-waves", "--state", "guessed"], "'guessed'"),
     "out under a device": (["run", "omni-waves", "--out", "/dev/null/x"], "can't be written"),

@@ -8,6 +8,7 @@ import pinocchio as pin
 import pytest
 
 from wfbook.omni import scenarios, simulate
+from wfbook.omni.machine import Mode
 from wfbook.omni.merits import ANGLES, driving_of, hand_of, hand_rpy, lifted, slips
 from wfbook.omni.robot import HAND_HEIGHT, HAND_RPY, NOMINAL_HEIGHT, STEERS_V, WHEEL_RADIUS
 from wfbook.omni.scenarios import SCENARIOS
@@ -176,15 +177,24 @@ def test_slip_is_along_the_axle_and_only_on_the_ground(mixed):
     assert slid[95] > 0.01 and np.all(slid[100:200] == 0.0) and slid[-1] < 0.08
 
 
-def test_a_swing_is_a_wheel_in_the_air_for_longer_than_a_bump(mixed):
-    assert mixed.metrics["swings"] == 0 and not lifted(mixed).any()
+def test_a_wheel_is_in_the_air_if_it_is_for_longer_than_a_bump(mixed):
+    assert not lifted(mixed).any()
     force = np.full_like(mixed.p, 50.0)
     force[20:25, 0] = force[100:160, 1] = force[-30:, 3] = 0.0
     hopping = replace(mixed, contact_force=force)
     expected = np.zeros((len(mixed.t), 4), bool)
     expected[100:160, 1] = expected[-30:, 3] = True
     np.testing.assert_array_equal(lifted(hopping), expected)
-    assert driving_of(hopping, 40.0)["swings"] == 2
+
+
+def test_swings_are_what_the_controller_lifts_and_on_legs_the_base_waits(mixed):
+    assert mixed.metrics["swings"] == 0
+    stance, mode, away = mixed.stance.copy(), mixed.mode.copy(), mixed.qpos.copy()
+    stance[50:90, 1] = stance[-30:, 3] = False
+    mode[40:], away[40:, 0] = Mode.LEGGED, away[40:, 0] + 1.0
+    walking = driving_of(replace(mixed, stance=stance, mode=mode, qpos=away), 40.0)
+    assert walking["swings"] == 2
+    assert walking["base_rms_m"] < 0.02 < driving_of(replace(mixed, qpos=away), 40.0)["base_rms_m"]
 
 
 def test_a_robot_that_goes_nowhere_has_no_cost_of_transport(squatted):

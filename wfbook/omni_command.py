@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 PREFIX = "omni-"
 NAMES = ("waves", "fixed", "straight", "crab", "rotate", "pivot", "combined", "turn", "squat")
+NAMES += ("obstacle", "jump")
 """Of the scenarios that :mod:`wfbook.omni.scenarios` lists."""
 
 FILES = ("run.npz", "metrics.json", "gait.png", "replay.html")
@@ -121,6 +122,9 @@ def run(arguments: argparse.Namespace, planning: tuple[str, ...]) -> int:
     for option, own in _OWN.items():
         if getattr(arguments, option) is not None and own not in scenario.options:
             raise CommandError(f"--{option} has no effect with {PREFIX + name}", WRONG_INPUT)
+    if scenario.legs and arguments.controller not in (None, "ddp"):
+        text = f"--controller: {arguments.controller} has no legged mode, which {PREFIX + name} takes"
+        raise CommandError(text, WRONG_INPUT)
     with result_folder(arguments.out or Path("runs") / f"{PREFIX}{name}", FILES) as folder:
         load("wfbook.view.omni", "wfbook.view.replay")
         with ProgressLine(sys.stderr) as line:

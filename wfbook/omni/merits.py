@@ -13,6 +13,7 @@ import pinocchio as pin
 
 from wfbook.go1_dynamics import GRAVITY
 from wfbook.modes import LEGS
+from wfbook.omni.machine import Mode
 from wfbook.omni.robot import Omni
 
 if TYPE_CHECKING:
@@ -74,11 +75,12 @@ def driving_of(run: "OmniRun", mass: float) -> dict[str, Any]:
     """Return how the robot drove, and at what cost.
 
     ``way_m`` is the length of the trunk's way seen from above, ``distance_m`` from its first point to its
-    last, and ``planned_distance_m`` that of the commanded base; ``swings`` is how often a wheel was lifted.
-    ``base_rms_*`` are root mean squares of the trunk's distance from the commanded base, seen from
-    above, and of the angle between them. ``slip_max_m`` is how far a wheel slid along its axle while it
-    touched the ground. Cost of transport is the motors' work over ``m g way``, with all work counted
-    (``cot_abs``) and only with what they put in (``cot_positive``); None if the robot goes nowhere.
+    last, and ``planned_distance_m`` that of the commanded base; ``swings`` is how often the controller
+    lifted a wheel. ``base_rms_*`` are root mean squares of the trunk's distance from the commanded base, seen
+    from above, and of the angle between them, while the robot is on its wheels: on legs the base waits.
+    ``slip_max_m`` is how far a wheel slid along its axle while it touched the ground. Cost of transport is
+    the motors' work over ``m g way``, with all work counted (``cot_abs``) and only with what they put in
+    (``cot_positive``); None if the robot goes nowhere.
 
     Args:
         run: to measure.
@@ -91,7 +93,8 @@ def driving_of(run: "OmniRun", mass: float) -> dict[str, Any]:
     power = run.tau * run.qvel[:, 6:]
     work = [float(np.trapezoid(p.sum(axis=1), run.t)) for p in (np.abs(power), np.maximum(power, 0.0))]
     costs = [float(w / (mass * -GRAVITY[2] * way)) if gone > _STAYS else None for w in work]
-    off = np.linalg.norm(place - run.pose[:, :2], axis=1)
+    rolling = run.mode == Mode.WHEELED
+    off = np.linalg.norm(place - run.pose[:, :2], axis=1)[rolling]
     duration, distance = float(run.t[-1]), float(np.linalg.norm(place[-1] - place[0]))
     return {
         "planned_distance_m": float(np.linalg.norm(run.pose[-1, :2] - run.pose[0, :2])),
@@ -102,8 +105,8 @@ def driving_of(run: "OmniRun", mass: float) -> dict[str, Any]:
         "cot_abs": costs[0],
         "cot_positive": costs[1],
         "base_rms_m": float(np.sqrt(np.mean(off**2))),
-        "base_rms_rad": float(np.sqrt(np.mean(_tilts(run) ** 2))),
-        "swings": int(np.sum(np.diff(lifted(run).astype(int), axis=0) > 0)),
+        "base_rms_rad": float(np.sqrt(np.mean(_tilts(run)[rolling] ** 2))),
+        "swings": int(np.sum(np.diff(run.stance.astype(int), axis=0) < 0)),
         "slip_max_m": float(np.abs(slips(run)).max()),
     }
 

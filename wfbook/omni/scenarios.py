@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wfbook.omni import simulate
+from wfbook.omni import legged, simulate
 from wfbook.omni.base import Base
 from wfbook.omni.controller import FEEDBACK
 from wfbook.omni.locked import NQ_LOCKED, Target, locked_model, locked_state, nominal_target
@@ -56,6 +56,7 @@ class Scenario:
         run: simulates it; takes ``options`` and those of :func:`wfbook.omni.simulate.run` that say who
             controls, what he knows and what is different from what he believes.
         options: of the scenario's own.
+        legs: whether it takes legs, which only the paper's controller has a mode for.
     """
 
     name: str
@@ -63,6 +64,7 @@ class Scenario:
     where: str
     run: Callable[..., OmniRun]
     options: tuple[str, ...] = ()
+    legs: bool = False
 
 
 class Poses:
@@ -220,6 +222,8 @@ SCENARIOS = {
         Scenario("combined", "straight, round on the spot, sideways", "Fig. 7b", combined),
         Scenario("turn", "1.8 rad on the spot and back", "Figs. 8a, 9, 10", turn),
         Scenario("squat", "squat and stand up", "Fig. 8b", squat),
+        Scenario("obstacle", "on legs over a bar across the way", "Fig. 5", legged.run_obstacle, legs=True),
+        Scenario("jump", "roll up, jump, roll on", "Fig. 5", legged.run_jump, legs=True),
     )
 }
-"""By name, in the paper's order."""
+"""By name, in the paper's order; then those that need legged mode, which the paper has and does not show."""
