@@ -10,7 +10,7 @@ from sphinx.application import Sphinx
 from wfbook.book.execute import ROOT
 
 _BEFORE_NAPOLEON = 400
-_NO_PYTHON = re.compile(r"<[^<>]*>")
+_NO_PYTHON = re.compile(r"<(?:[^<>]|<[^<>]*>)*>")
 _PATH = re.compile(rf"PosixPath\('{re.escape(str(ROOT))}/([^']*)'\)")
 _VALUES = {"attribute", "data", "property"}
 
