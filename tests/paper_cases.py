@@ -7,6 +7,7 @@ import numpy as np
 from view_cases import SLOT, small_plan
 
 from wfbook.paper.bench import Bench, Execution, Planned
+from wfbook.paper.drives import Drive
 from wfbook.paper.options import Options
 from wfbook.paper.record import Record
 from wfbook.paper.store import Store
@@ -62,7 +63,10 @@ REACH = {("foot",): 1.5, ("foot", "wheel"): 3.0}
 
 @dataclass
 class Invented(Bench):
-    """A bench whose plans, runs and times are invented: feet cost 0.6, wheels 0.2, with friction 0.3."""
+    """A bench whose plans, runs and times are invented: feet cost 0.6, wheels 0.2, with friction 0.3.
+
+    In part II the hand wobbles by 1 mm; by 2 and 50 mm when the arm alone carries it.
+    """
 
     def plan(self, problem, label):
         self.show(self.head + label)
@@ -77,6 +81,63 @@ class Invented(Bench):
 
     def time(self, asked, label):
         return outcome(0.1 * asked.slots * len(asked.end_effectors) * len(asked.terrain.regions))
+
+    def drive(self, name, label, seeds=None, **options):
+        self.show(self.head + label)
+        wobble = {"ik-level": 0.05, "ik-true": 0.002}.get(options.get("controller"), 0.001)
+        seeds = self.options.seeds if seeds is None else min(seeds, self.options.seeds)
+        return [drive(seed, wobble, options.get("controller", "ddp")) for seed in range(seeds)]
+
+    def solve(self, label):
+        return {
+            **{"cold": [90.0, 100.0, 120.0], "cold_iterations": 3, "cold_far": 900.0},
+            **{"cold_far_iterations": 14, "warm": [2.0, 3.0, 4.0], "states": 41, "precision": 1e-4},
+        }
+
+
+def drive(seed: int = 0, wobble: float = 0.001, controller: str = "ddp") -> Drive:
+    """Return what would be kept of a run of part II whose hand wobbles, in metres, a tenth more a seed.
+
+    The base turns by 1.8 rad and back, the trunk goes down by 0.1 m and up again, wheels go 5 cm both ways.
+    """
+    t = np.arange(0.0, 4.0, 0.02)
+    wave, hump = np.sin(2 * np.pi * t), np.sin(np.pi * t / 4.0)
+    size = wobble * (1 + 0.1 * seed)
+    hand = np.column_stack((0.5 + 0 * t, 0.5 * size * wave, 0.92 + size * wave))
+    rpy = np.array([-np.pi / 2, 0.0, -np.pi / 2]) + 2.0 * size * np.column_stack((wave, 0 * t, -wave))
+    base = rpy + np.outer(1.8 * hump, [0.0, 0.0, -1.0])
+    legs = np.tile([0.8, -1.6], 4) + 0.1 * np.outer(wave, np.tile([1.0, -1.0], 4))
+    metrics = {
+        "hand_height_mean_m": float(hand[:, 2].mean()),
+        "hand_height_std_m": float(hand[:, 2].std()),
+        "hand_height_max_error_m": size,
+        "hand_level_max_error_m": 0.5 * size,
+        "hand_turn_max_rad": 3.0 * size,
+        "base_rms_rad": 0.01,
+        "finished": True,
+        "events": [],
+    }
+    for axis, name in enumerate(("roll", "pitch", "yaw")):
+        metrics[f"hand_{name}_mean_rad"] = float(rpy[:, axis].mean())
+        metrics[f"hand_{name}_std_rad"] = float(rpy[:, axis].std())
+    metrics |= {f"plan_ms_{name}": value for name, value in (("p5", 4.0), ("median", 5.0), ("p95", 6.0))}
+    meta = {"seed": seed, "controller": controller, "noise": True, "delay": 0.009}
+    return Drive(
+        t=t,
+        hand=hand,
+        hand_ref=np.tile([0.5, 0.0, 0.92], (len(t), 1)),
+        rpy=rpy,
+        base_rpy=base,
+        base_rpy_ref=base,
+        trunk=np.column_stack((3.0 * t - 0.5, 0 * t, 0.53 - 0.1 * hump)),
+        yaw=1.8 * hump,
+        legs=legs,
+        legs_ref=legs + 0.01,
+        wheels=np.tile(0.05 * wave[:, None], 4),
+        arm_margin=0.3 + 0 * t,
+        metrics=metrics,
+        meta=meta | {"course": [[2.0, [0.0, 0.0, 0.9]], [2.0, [0.0, 0.0, -0.9]]]},
+    )
 
 
 def outcome(search_s, status="optimal", gap=1e-3, message=None):

@@ -15,7 +15,7 @@ ORDER = (
     "go1", "go1_dynamics", "standing", "reference", "qp", "wbc", "stance", "kalman", "sensors",
     "leg_odometry", "estimator", "recording", "ideal", "flights", "footing", "lean", "drift", "tracking",
     "runs", "simulate", "forecast", "receding", "omni", "view", "report", "results", "arguments", "quoted",
-    "table2", "study", "paper", "equations", "book", "exercises", "classroom", "__main__",
+    "omni_command", "table2", "study", "paper", "equations", "book", "exercises", "classroom", "__main__",
 )  # fmt: skip
 """The modules and packages, helpers before the chapter that they serve."""
 

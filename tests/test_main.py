@@ -338,8 +338,8 @@ def test_help_names_every_terrain(capsys):
         main(["run", "--help"])
     assert ended.value.code == 0
     out = " ".join(capsys.readouterr().out.split())
-    for name in ("flat-friction", "ramp-down", "ramp-up"):
-        assert name in out.replace("- ", "-")
+    for name in ("flat-friction", "ramp-down", "ramp-up", "omni-waves", "omni-squat"):
+        assert name in out.replace("- ", "-"), name
 
 
 def test_lab_opens_the_notebooks(monkeypatch):

@@ -13,6 +13,7 @@ from wfbook.omni.costs import TERMS, Weights
 from wfbook.omni.dynamics import LOCKED, forward_dynamics
 from wfbook.omni.locked import (
     MOTORS,
+    accompanying,
     held_rows,
     holding_effort,
     locked_state,
@@ -20,7 +21,7 @@ from wfbook.omni.locked import (
     nominal_state,
     nominal_target,
 )
-from wfbook.omni.problem import OptimalControl
+from wfbook.omni.problem import _ROLLING, OptimalControl
 from wfbook.omni.robot import NV, WHEEL_RADIUS, Omni, OmniDynamics, posture
 from wfbook.omni.wrench import point_contact
 from wfbook.terrain import flat
@@ -77,6 +78,49 @@ def test_derivatives_of_rolling_on_slopes_with_steered_wheels(seed):
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     ocp.place_contacts(x, rng.uniform(-1.5, 1.5, 4), normals)
     check_derivatives(ocp, ocp.actions[0], x, holding_effort(ocp.model, x) + 5 * rng.standard_normal(14))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_rolling_contacts_go_as_they_are_told(seed):
+    rng = np.random.default_rng(seed)
+    ocp = standing(1)
+    x = disturbed(ocp, rng, 0.1)
+    normals = np.array([0.0, 0.0, 1.0]) + 0.2 * rng.standard_normal((4, 3))
+    ocp.place_contacts(x, rng.uniform(-1.5, 1.5, 4), normals / np.linalg.norm(normals, axis=1)[:, None])
+    ocp.hold(x)
+    velocities = 0.3 * rng.standard_normal((2, 4, 3))
+    ocp.roll(velocities)
+    u = holding_effort(ocp.model, x) + 5 * rng.standard_normal(14)
+    check_derivatives(ocp, ocp.actions[0], x, u)
+    gained, data = ocp.acceleration(x, u), ocp.model.createData()
+    pin.forwardKinematics(ocp.model, data, x[:21], x[21:], gained)
+    for i, (leg, rows) in enumerate(held_rows((True,) * 4).items()):
+        args = ocp.model, data, ocp.model.getFrameId(f"{leg}_{rows}")
+        pin.updateFramePlacement(*args)
+        R = data.oMf[args[2]].rotation
+        speed = pin.getFrameVelocity(*args, pin.LOCAL).linear
+        found = pin.getFrameClassicalAcceleration(*args, pin.LOCAL).linear
+        told = (velocities[1, i] - velocities[0, i]) / ocp.dt + _ROLLING * velocities[0, i]
+        keep = ["xyz".index(row) for row in rows]
+        np.testing.assert_allclose(found[keep], (told @ R - _ROLLING * speed)[keep], atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_legs_and_arm_go_along_with_the_ground(seed):
+    rng = np.random.default_rng(seed)
+    ocp = standing(1)
+    x = disturbed(ocp, rng, 0.1)
+    velocities = 0.3 * rng.standard_normal((1, 4, 3))
+    v = accompanying(ocp.model, [x], velocities)[0]
+    data = ocp.model.createData()
+    pin.forwardKinematics(ocp.model, data, x[:21], v)
+    hand = pin.getFrameVelocity(ocp.model, data, ocp.model.getFrameId("hand"), pin.LOCAL)
+    np.testing.assert_allclose(hand.vector, 0.0, atol=0.02)
+    for leg, wanted in zip(LEGS, velocities[0], strict=True):
+        frame = ocp.model.getFrameId(f"{leg}_xyz")
+        found = pin.getFrameVelocity(ocp.model, data, frame, pin.LOCAL_WORLD_ALIGNED).linear
+        np.testing.assert_allclose(found[[0, 2]], wanted[[0, 2]], atol=0.05)
+    assert accompanying(ocp.model, [x], np.zeros((1, 4, 3))) == pytest.approx(0.0)
 
 
 @pytest.mark.parametrize("stance", [(True,) * 4, (False, True, True, True), (False, False, True, True)])
@@ -314,6 +358,8 @@ def test_what_is_wrong_is_said():
         OptimalControl(1, without=["magic"])
     with pytest.raises(ValueError, match=r"stances\[0\]"):
         OptimalControl(1).stand([(False, True, True, True)] * 2)
+    with pytest.raises(ValueError, match="roll: wheels are locked"):
+        OptimalControl(1, mode="legged").roll(np.zeros((2, 4, 3)))
 
 
 def test_a_solution_that_is_not_finite_is_refused_and_the_last_one_kept():

@@ -15,24 +15,25 @@ import wfbook
 from wfbook import planner, simulate, terrain
 from wfbook.__main__ import main
 from wfbook.go1_dynamics import MOTORS
-from wfbook.paper import bench, gaits, store, times
+from wfbook.paper import bench, gaits, store, times, waves
 from wfbook.paper.bench import Bench, Execution
 from wfbook.paper.options import NAMES, Options
 from wfbook.paper.parts import EXPERIMENTS
 from wfbook.paper.record import compared, measured, stated
 from wfbook.paper.store import Store
 from wfbook.paper.text import cells, markdown, number
-from wfbook.quoted import PAPER_A, value
+from wfbook.quoted import PAPER_A, PAPER_B, value
 from wfbook.table2.benchmark import ROWS
 
 
 def test_every_number_of_the_paper_is_compared_or_says_why_not(tmp_path):
     used = [key for experiment in EXPERIMENTS for key in experiment.paper]
-    used.append("delay")  # a setting of every simulation
+    used += ["delay", "omni.pitch_shift"]  # a setting of every simulation, and one of every pitch
     assert len(used) == len(set(used))
-    assert {said.key for said in PAPER_A if not said.unused} == set(used)
-    assert len({said.key for said in PAPER_A}) == len(PAPER_A)
-    for said in PAPER_A:
+    both = PAPER_A + PAPER_B
+    assert {said.key for said in both if not said.unused} == set(used)
+    assert len({said.key for said in both}) == len(both)
+    for said in both:
         assert said.where and said.says
         assert (said.value is not None) == bool(said.unit)
     assert value("delay") / 1e3 == bench.DELAY
@@ -56,6 +57,32 @@ def test_the_papers_numbers_agree_with_each_other():
     assert value("cot.reduction") == round(100 * (1 - 1 / ratio), 1)
     assert [value(f"table2.{row.name}") for row in ROWS[:-1]] == [row.gurobi_s for row in ROWS[:-1]]
     assert value("table2.long") == 2 * value("table2.short") == 10 * gaits.SLOT_S
+
+
+@pytest.mark.parametrize(
+    ("key", "possible"),
+    [("waves.ik_", True), ("waves.", False), ("fixed.", True), ("combined.", True)],
+)
+def test_no_largest_error_is_smaller_than_mean_and_deviation_make_it(key, possible):
+    """Of paper B's four, one can't be: not even with the last digits rounded in its favour."""
+    separator = "" if key.endswith("_") else "."
+    mean, std, most = (value(f"{key.rstrip('.')}{separator}{name}") for name in ("mean", "std", "max"))
+    half = 0.0005
+    least = np.hypot(max(0.0, abs(mean - value("omni.height")) - half), std - half)
+    assert bool(most + half >= least) == possible
+
+
+def test_the_second_papers_numbers_agree_with_each_other():
+    assert waves.least_error("waves") > value("waves.max")
+    for name in ("cold", "warm", "stable"):
+        assert value(f"omni.{name}_least") < value(f"omni.{name}_most")
+    assert value("omni.stable_most") < value("omni.warm_least") < value("omni.cold_least")
+    joints = sum(value(f"omni.{kind}_joints") for kind in ("leg", "steering", "wheel", "arm"))
+    unlocked = value("omni.leg_joints") + value("omni.arm_joints") - 1  # the gripper
+    assert value("omni.states") == 7 + 6 + 2 * unlocked
+    assert joints == 23
+    assert value("omni.pitch_shift") == value("omni.roll") == value("omni.yaw")
+    assert value("omni.speed") > waves.SPEED
 
 
 def counted(monkeypatch, answers):
@@ -193,6 +220,8 @@ def test_records_as_cells():
     assert cells(said.to_dict()) == (
         *("cost of transport, feet and wheels", "0.105", "0.0523", "0.0500 to 0.0550", "0.50", "gap 1 %"),
     )
+    angle = compared("waves.roll", -1.57081234, "", [-1.571, -1.5706])
+    assert cells(angle.to_dict())[1:4] == ("-1.578 rad", "-1.571 rad", "-1.571 to -1.571")
     assert cells(stated("fig9.mostly_wheels", False, 40.0, "%").to_dict())[1:5] == (
         "stated",
         "no: 40 %",
@@ -230,10 +259,10 @@ def test_the_command_writes_and_tells_everything(command, capsys, tmp_path):
     assert report["complete"]
     assert report["options"]["delay_ms"] == 9.0
     assert report["options"]["seeds"] == [0, 1]
-    assert "1 of 8  flat" in progress
+    assert "1 of 14  flat" in progress
     text = (folder / "paper.md").read_text()
-    for said in PAPER_A:
-        assert said.says in text or said.key == "delay"
+    for said in PAPER_A + PAPER_B:
+        assert said.says in text or said.key in ("delay", "omni.pitch_shift")
         assert said.unused in text
     assert text == markdown(report)
     assert all(f"]({name})" in text for name in pictures_)

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from wfbook import omni_command as omni
 from wfbook import terrain as ground
 from wfbook.arguments import (
     FAILED,
@@ -94,7 +95,13 @@ def _parser() -> argparse.ArgumentParser:
     )
     run.set_defaults(command=_run)
     names = ", ".join(ground.BUILTIN_NAMES)
-    run.add_argument("terrain", metavar="TERRAIN", nargs="?", help=f"{names}, or a terrain FILE.json")
+    experiments = ", ".join(omni.PREFIX + name for name in omni.NAMES)
+    run.add_argument(
+        "terrain",
+        metavar="TERRAIN",
+        nargs="?",
+        help=f"{names}, or a terrain FILE.json; of part II {experiments}",
+    )
     planning = run.add_argument_group("planning")
     planning.add_argument("--goal", type=goal, metavar="X,Y", help="where to go, metres (0.1 m ahead a slot)")
     planning.add_argument("--slots", type=whole(1), help="0.3 s swing slots (10)")
@@ -127,6 +134,7 @@ def _parser() -> argparse.ArgumentParser:
         help="what the controller sees: the state it estimates from noisy sensors (default), or the true one",
     )
     execution.add_argument("--seed", type=whole(0), default=0, help="of everything random (0)")
+    omni.add_to(run)
     output = run.add_argument_group("output")
     output.add_argument("--out", metavar="DIR", help="folder for the results (runs/TERRAIN)")
     output.add_argument("--json", action="store_true", help="print the metrics as JSON instead of a table")
@@ -146,6 +154,9 @@ def _parser() -> argparse.ArgumentParser:
 
 def _run(arguments: argparse.Namespace) -> int:
     """Plan (or load a plan), execute, write the results and tell what happened."""
+    if omni.asked_for(arguments.terrain):
+        return omni.run(arguments, ("plan", *PLANNING))
+    omni.refuse(arguments)
     plan = problem = None
     if arguments.plan is not None:
         plan = _given_plan(arguments)
@@ -194,7 +205,8 @@ def _given_plan(arguments: argparse.Namespace) -> "Plan":
 def _problem(arguments: argparse.Namespace) -> "Problem":
     if arguments.terrain is None:
         known = ", ".join(ground.BUILTIN_NAMES)
-        raise CommandError(f"TERRAIN is missing: one of {known}, or a file ending in .json", WRONG_INPUT)
+        text = f"TERRAIN is missing: one of {known}, a file ending in .json, or {omni.PREFIX}…"
+        raise CommandError(text, WRONG_INPUT)
     with wrong_input():
         terrain = ground.named_or_file(arguments.terrain)
     unused = ("formulation", "time_limit") if arguments.replan else ("clock",)

@@ -3,7 +3,8 @@
 These are the only results in the library that are typed in by hand. A number is kept as it is printed, so
 that what follows from several of them can be checked against them. Figures 8 to 12 are gait diagrams and
 figure 13 shows paths, all without numbers: what the text says about them is here in words. Paper A reports
-neither errors of its controller nor of its estimator, and no hardware.
+neither errors of its controller nor of its estimator, and no hardware. Paper B's hardware is described in
+words alone; its figures' curves are not in its text.
 """
 
 from dataclasses import dataclass
@@ -97,7 +98,91 @@ PAPER_A = (
 """*Trajectory Optimization Through Mixed-Integer Optimization of Contact Dynamics for Switching End Effector
 Locomotion*, sections IV and V, in reading order."""
 
-_BY_KEY = {quoted.key: quoted for quoted in PAPER_A}
+_SIX, _FIXED, _MODES = "Paper B, Fig. 6", "Paper B, Fig. 7a", "Paper B, Fig. 7b"
+_TURN, _SQUAT, _TIMES = "Paper B, Figs. 8a, 9, 10", "Paper B, Fig. 8b", "Paper B, Formulation"
+_PLATFORM = "Paper B, Results"
+
+
+def _hand(key: str, where: str, height: tuple, roll: tuple, pitch: tuple, yaw: tuple) -> tuple[Quoted, ...]:
+    """Return a simulation's figures of the hand: means, deviations, and the largest error of its height."""
+    mean, std, most = height
+    numbers = [Quoted(f"{key}.mean", where, "hand's height, mean", mean, "m")]
+    numbers.append(Quoted(f"{key}.std", where, "hand's height, standard deviation", std, "m"))
+    numbers.append(Quoted(f"{key}.max", where, "hand's height, largest error", most, "m"))
+    for name, (middle, spread) in (("roll", roll), ("pitch", pitch), ("yaw", yaw)):
+        numbers.append(Quoted(f"{key}.{name}", where, f"hand's {name}, mean", middle, "rad"))
+        numbers.append(
+            Quoted(f"{key}.{name}_std", where, f"hand's {name}, standard deviation", spread, "rad")
+        )
+    return tuple(numbers)
+
+
+PAPER_B = (
+    Quoted("omni.speed", "Paper B, Unified Model", "speeds that it mainly drives at, below", 2.0, "m/s"),
+    # Formulation of Motion Control: computing times.
+    Quoted("omni.states", _TIMES, "state variables of the optimal control problem", 41, "states"),
+    Quoted("omni.nodes_cold", _TIMES, "time steps of the cold start", 160, "steps"),
+    Quoted("omni.precision", _TIMES, "precision of convergence", 1e-4, "1"),
+    Quoted("omni.cold_least", _TIMES, "time of a cold start, from", 130.0, "ms"),
+    Quoted("omni.cold_most", _TIMES, "time of a cold start, to", 170.0, "ms"),
+    Quoted("omni.nodes_warm", _TIMES, "time steps during execution", 20, "steps"),
+    Quoted("omni.warm_least", _TIMES, "time of a warm start during execution, from", 11.0, "ms"),
+    Quoted("omni.warm_most", _TIMES, "time of a warm start during execution, to", 13.0, "ms"),
+    Quoted("omni.stable_least", _TIMES, "time of a warm start in stable phases, from", 3.0, "ms"),
+    Quoted("omni.stable_most", _TIMES, "time of a warm start in stable phases, to", 4.0, "ms"),
+    Quoted("omni.feedback", _TIMES, "rate of the linear feedback", 500.0, "Hz"),
+    Quoted(
+        *("omni.orin", _TIMES, "computed on an Nvidia Jetson Orin NX"),
+        unused="ours are times of the machine named above",
+    ),
+    # Results: the robot.
+    Quoted("omni.leg_joints", _PLATFORM, "leg joints", 8, "joints"),
+    Quoted("omni.steering_joints", _PLATFORM, "steering joints", 4, "joints"),
+    Quoted("omni.wheel_joints", _PLATFORM, "wheel-driving joints", 4, "joints"),
+    Quoted("omni.arm_joints", _PLATFORM, "degrees of freedom of the arm with its gripper", 7, "joints"),
+    # Simulation.
+    Quoted("omni.length", _SIX, "length of the wave-shaped ground", 11.5, "m"),
+    Quoted("omni.peak", _SIX, "peak height of the waves", 0.2, "m"),
+    Quoted("omni.height", _SIX, "hand's target height", 0.92, "m"),
+    Quoted("omni.roll", _SIX, "hand's target roll", -1.57, "rad"),
+    Quoted("omni.pitch", _SIX, "hand's target pitch", 0.0, "rad"),
+    Quoted("omni.yaw", _SIX, "hand's target yaw", -1.57, "rad"),
+    Quoted("omni.pitch_shift", _SIX, "shift of the pitch in figures", -1.57, "rad"),
+    Quoted("waves.ik_mean", _SIX, "hand's height, mean, inverse kinematics", 0.928, "m"),
+    Quoted("waves.ik_std", _SIX, "hand's height, standard deviation, inverse kinematics", 0.041, "m"),
+    Quoted("waves.ik_max", _SIX, "hand's height, largest error, inverse kinematics", 0.083, "m"),
+    *_hand("waves", _SIX, (0.924, 0.008, 0.007), (-1.578, 0.009), (-1.580, 0.05), (-1.575, 0.08)),
+    Quoted("waves.calmer", _SIX, "the whole-body controller lets the hand oscillate less than the arm alone"),
+    *_hand("fixed", _FIXED, (0.919, 0.005, 0.018), (-1.597, 0.016), (-1.561, 0.003), (-1.545, 0.016)),
+    Quoted("fixed.legs", _FIXED, "ends of all legs shift forward or backward"),
+    Quoted("fixed.joints", _FIXED, "joints deviate significantly to keep the base stable"),
+    *_hand("combined", _MODES, (0.916, 0.002, 0.011), (-1.594, 0.033), (-1.573, 0.009), (-1.551, 0.057)),
+    # Experiments, on hardware.
+    Quoted("turn.angle", _TURN, "angle of the rotation in place", 1.8, "rad"),
+    Quoted("turn.returns", _TURN, "returns to the initial orientation"),
+    Quoted("turn.height", _TURN, "the hand's height remains nearly constant"),
+    Quoted("turn.drift", _TURN, "minor horizontal drifts of the hand"),
+    Quoted("turn.yaw", _TURN, "in the base's axes the hand's yaw rotates and recovers"),
+    Quoted("turn.legs", _TURN, "legs work in coordination to stabilize the body"),
+    Quoted("turn.limit", _TURN, "the arm runs into a hard joint limit"),
+    Quoted(
+        *("turn.target", _TURN, "hand's target orientation of (1.57, 0, 0) rad"),
+        unused="in axes that are not given; here it is that of the simulations",
+    ),
+    Quoted(
+        *("turn.oscillates", _TURN, "oscillations around 10 to 12 s and 15 to 17 s"),
+        unused="of the hardware's estimation and joint limits",
+    ),
+    Quoted(
+        *("turn.sawtooth", _TURN, "sawtooth-like oscillations of sensor readings"),
+        unused="of the hardware's sensors",
+    ),
+    Quoted("squat.hand", _SQUAT, "the hand remains stable while the robot squats and stands up"),
+)
+"""*Whole-body Motion Control of an Omnidirectional Wheel-Legged Mobile Manipulator via Contact-Aware Dynamic
+Optimization*, in reading order. Pitch is as printed, with the shift of the figures."""
+
+_BY_KEY = {quoted.key: quoted for quoted in PAPER_A + PAPER_B}
 
 
 def quoted(key: str) -> Quoted:

@@ -8,5 +8,9 @@ that does it. Chapter 10: :mod:`.wrench` is what one contact can do, :mod:`.supp
 :mod:`.locked` has its 41 states, :mod:`.costs` the terms of the cost, and :mod:`.problem` the optimal
 control problem in Crocoddyl. Chapter 12: :mod:`.waves` is the terrain, :mod:`.rolling` keeps the wheels to a
 commanded base, :mod:`.controller` is whole-body control and what paper B compares itself with, and
-:mod:`.simulate` the runs.
+:mod:`.habits` what can be left out of it. For legged mode :mod:`.stride` and :mod:`.jump` say what is asked
+of steps and jumps, :mod:`.motion` plans them, and :mod:`.on_legs` follows the plan; :mod:`.machine` changes
+between the modes and :mod:`.two_modes` carries out tasks. :mod:`.simulate` has the runs, :mod:`.merits` what
+is measured of them, :mod:`.scenarios` the paper's experiments by name, and :mod:`.legged` those that need
+legs.
 """

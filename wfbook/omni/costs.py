@@ -30,11 +30,13 @@ class Weights:
         leg: of a swinging wheel's position.
         com: ``(3,)`` of the centre of mass, x, y, z.
         contact: of force outside the friction pyramid.
+        least_force: smallest normal force of a wheel that stands, N; with more than 0 the zero-moment point
+            keeps away from the edges of the area of support.
         effort: of torque.
         trunk: ``(3,)`` of roll, pitch, yaw.
         posture: of the legs' joints.
         arm_posture: of the arm's joints.
-        velocity: of all generalised velocities.
+        velocity: of all generalised velocities, less those that go along with the ground.
         hand: ``(3,)`` of the hand's position.
         hand_rotation: of its orientation.
         limits: of joints outside their range.
@@ -44,6 +46,7 @@ class Weights:
     leg: float = 1e4
     com: tuple[float, float, float] = (300.0, 300.0, 1000.0)
     contact: float = 1e-2
+    least_force: float = 0.0
     effort: float = 1e-4
     trunk: tuple[float, float, float] = (60.0, 60.0, 200.0)
     posture: float = 1.0
@@ -111,8 +114,9 @@ def contact(model: Model, frame: str, mu: float, weights: Weights) -> crocoddyl.
     """
     cone = pyramid(mu)
     residual = crocoddyl.ResidualModelContactFrictionCone(model.state, model.frame(frame), cone, model.nu)
-    bounds = crocoddyl.ActivationBounds(cone.lb, cone.ub)
-    activation = crocoddyl.ActivationModelQuadraticBarrier(bounds)
+    low = np.array(cone.lb)
+    low[-1] = weights.least_force  # the last row is the normal force
+    activation = crocoddyl.ActivationModelQuadraticBarrier(crocoddyl.ActivationBounds(low, cone.ub))
     return crocoddyl.CostModelResidual(model.state, activation, residual)
 
 

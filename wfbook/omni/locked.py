@@ -18,6 +18,9 @@ NQ_LOCKED, NV_LOCKED, NU_LOCKED = 21, 20, 14
 MOTORS = np.sort(np.concatenate([LEGS_V, ARM_V])) - 6
 """Which of the robot's 23 motors the 14 torques are."""
 
+_DAMPED = 1e-3
+"""Square of the leverage, m², below which a joint is not asked to do much for a contact or the hand."""
+
 ROWS = ("xyz", "xz")
 """Kinds of contact: held in space, in the contact's axes; or in the leg's plane, in the shank's axes."""
 
@@ -123,6 +126,44 @@ def holding_effort(model: pin.Model, x: np.ndarray) -> np.ndarray:
     )
     forces = np.linalg.lstsq(rows[:, :6].T, gravity[:6], rcond=None)[0]
     return (gravity - rows.T @ forces)[6:]
+
+
+def accompanying(model: pin.Model, xs: Sequence[np.ndarray], velocities: np.ndarray) -> np.ndarray:
+    """Return velocities ``(n, 20)`` of a robot that goes along with its wheels and whose hand rests.
+
+    The trunk rises as the wheels do on average and does not turn. Legs let each wheel have its own velocity
+    in the leg's plane, the arm takes the trunk's from the hand.
+
+    Args:
+        model: of :func:`contact_model`.
+        xs: ``n`` states ``(41,)``.
+        velocities: ``(n, 4, 3)`` of the contacts.
+    """
+    data, n = model.createData(), len(xs)
+    frames = [model.getFrameId(name) for name in (*(f"{leg}_xyz" for leg in LEGS), "hand")]
+    rows, trunk = np.zeros((n, 5, 6, NV_LOCKED)), np.zeros((n, 3, 3))
+    for i, x in enumerate(xs):
+        pin.computeJointJacobians(model, data, x[:NQ_LOCKED])
+        trunk[i] = data.oMi[1].rotation
+        for row, frame in zip(rows[i], frames, strict=True):
+            row[:] = pin.getFrameJacobian(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
+    up = velocities[..., 2].mean(axis=1)
+    found = np.zeros((n, NV_LOCKED))
+    found[:, :3] = up[:, None] * trunk[:, 2]
+    relative = velocities[..., [0, 2]] - np.array([0.0, 1.0]) * up[:, None, None]
+    for leg in range(4):
+        joints = slice(6 + 2 * leg, 8 + 2 * leg)
+        found[:, joints] = _damped(rows[:, leg, [0, 2], joints], relative[:, leg])
+    away = np.zeros((n, 6))
+    away[:, 2] = -up
+    found[:, 14:] = _damped(rows[:, 4, :, 14:], away)
+    return found
+
+
+def _damped(J: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """Return rates ``(n, k)`` for velocities ``(n, m)``, less where J ``(n, m, k)`` all but loses rank."""
+    square = J @ J.transpose(0, 2, 1) + _DAMPED * np.eye(J.shape[1])
+    return (J.transpose(0, 2, 1) @ np.linalg.solve(square, wanted[..., None]))[..., 0]
 
 
 def nominal_state(height: float = NOMINAL_HEIGHT) -> np.ndarray:

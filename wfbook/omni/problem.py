@@ -6,9 +6,10 @@ the plane that their leg moves in. For a leg can't move or push out of that plan
 diagonal ones carry what pushes sideways. No contact has a moment. About the axle, a free moment would be one
 that no wheel can have, and an optimiser finds and uses it.
 
-**Wheeled mode.** Wheels roll; their speed is the wheel motors' business, so the contact points go on as they
-go, without acceleration. The problem is stated in axes that go along with the commanded twist
-(:mod:`.controller`), where they hardly move.
+**Wheeled mode.** Wheels roll; their speed is the wheel motors' business and their height the ground's. So
+each contact point is told its velocity (:meth:`OptimalControl.roll`), and it may change from node to node:
+that is how the horizon knows the ground ahead. The problem is stated in axes that go along with the commanded
+twist (:mod:`.controller`), where contacts hardly move on level ground.
 
 **Legged mode.** Wheels are locked and stand; which of them stand may change from node to node, and one that
 does not follows a path.
@@ -27,8 +28,10 @@ from wfbook.omni import costs, touching
 from wfbook.omni.costs import TERMS, Model, Weights
 from wfbook.omni.locked import (
     NQ_LOCKED,
+    NV_LOCKED,
     ROWS,
     Target,
+    accompanying,
     contact_model,
     held_rows,
     holding_effort,
@@ -39,8 +42,12 @@ from wfbook.omni.robot import contact_offsets
 
 MODES = ("wheeled", "legged")
 FRICTION = 0.7
-_SETTLING = 20.0
-"""Rate, 1/s, at which a locked wheel's contact comes to rest in legged mode. Rolling wheels have none."""
+_SETTLING, _ROLLING = 20.0, 10.0
+"""Rates, 1/s, at which contacts come to the velocity that they should have: those of locked wheels, which is
+none, and of rolling ones."""
+_THREAD = 1e-12
+"""Stiffness, 1/s², with which a rolling contact is drawn to a point so far away that the draught is even:
+Crocoddyl has no other way to give a contact an acceleration."""
 
 _UP = np.tile([0.0, 0.0, 1.0], (4, 1))
 
@@ -113,12 +120,15 @@ class OptimalControl:
         datas = [*self.problem.runningDatas, self.problem.terminalData]
         contacts = [data.differential.multibody.contacts.contacts.todict() for data in datas]
         self._contacts = {name: [node[name] for node in contacts] for name in contacts[0]}
+        items = [action.differential.contacts.contacts.todict() for action in self.actions]
+        self._pulled = [{name: item.contact for name, item in node.items()} for node in items]
         self._costs = [action.differential.costs.costs.todict() for action in self.actions]
         if self.problem.nthreads != 1:  # on a busy machine threads wait for each other at every pass
             self.problem.nthreads = 1
         self.solver = {"FDDP": crocoddyl.SolverFDDP, "BoxFDDP": crocoddyl.SolverBoxFDDP}[solver](self.problem)
         self.solver.th_stop = 1e-4
         self.stand([(True,) * 4] * (nodes + 1))
+        self._going = np.zeros((nodes + 1, NV_LOCKED))
         self.refer([nominal_target()] * (nodes + 1))
         self.place_contacts(start)
         self.hold(start)
@@ -127,7 +137,7 @@ class OptimalControl:
         """Return a node of Paper B, eqs 4 and 17: every contact it may have, and the cost ``scale`` times."""
         contacts = crocoddyl.ContactModelMultiple(self.state, self.actuation.nu)
         total = crocoddyl.CostModelSum(self.state, self.actuation.nu)
-        gains = np.array([0.0, _SETTLING if self.mode == "legged" else 0.0])
+        gains = np.array([0.0, _SETTLING] if self.mode == "legged" else [_THREAD, _ROLLING])
         for leg in LEGS:
             space, plane = (self.model.getFrameId(f"{leg}_{rows}") for rows in ROWS)
             contacts.addContact(
@@ -174,13 +184,14 @@ class OptimalControl:
             stances: ``nodes + 1`` of ``(4,)`` bool.
 
         Raises:
-            ValueError: a node in which no wheel stands, or one that lifts a wheel in wheeled mode.
+            ValueError: a node that lifts a wheel in wheeled mode. In legged mode none needs to stand: in
+                flight eq. 4 has no contact rows.
         """
         for node, stance in enumerate(stances):
             stance = tuple(bool(stands) for stands in stance)
             if stance == self.stances[node]:
                 continue
-            if not any(stance) or (self.mode == "wheeled" and not all(stance)):
+            if self.mode == "wheeled" and not all(stance):
                 raise ValueError(f"stances[{node}]: {stance}: too few wheels stand for {self.mode} mode")
             self.stances[node] = stance
             held, dynamics = held_rows(stance), self.actions[node].differential
@@ -201,9 +212,9 @@ class OptimalControl:
             targets: ``nodes + 1``.
         """
         self.asked = [target.hand for target in targets]
-        for terms, target in zip(self._costs, targets, strict=True):
+        for terms, target, going in zip(self._costs, targets, self._going, strict=True):
             reference = self.state.zero()
-            reference[7:NQ_LOCKED] = target.posture
+            reference[7:NQ_LOCKED], reference[NQ_LOCKED:] = target.posture, going
             values = {
                 "hand": target.hand,
                 "hand_rotation": target.hand_rotation,
@@ -253,6 +264,34 @@ class OptimalControl:
         back = placement.inverse().action
         for data in self._contacts[contact]:
             data.jMf, data.fXj = placement, back
+
+    def roll(self, velocities: np.ndarray) -> None:
+        """Say how the wheels' contacts go in wheeled mode; by default they stand still.
+
+        Between two nodes a contact accelerates as these velocities do, and where it goes otherwise that goes
+        away at a given rate. For a wheel that turns at a speed W relative to the fork, the velocity of what
+        is fixed to the fork at the contact is W times the radius along the ground, however the fork turns.
+        What :meth:`refer` asks of the joints' velocities goes along; call it afterwards.
+
+        Args:
+            velocities: ``(nodes + 1, 4, 3)`` in the problem's axes. The robot is taken to move through the
+                states of the last solution.
+
+        Raises:
+            ValueError: the mode is legged.
+        """
+        if self.mode != "wheeled":
+            raise ValueError(f"roll: wheels are locked in {self.mode} mode")
+        gained = np.diff(velocities, axis=0, append=velocities[-1:]) / self.dt
+        pulls = (gained + _ROLLING * velocities) / _THREAD
+        held = held_rows((True,) * 4).values()
+        for x, pull, contacts in zip(self.xs, pulls, self._pulled, strict=True):
+            pin.forwardKinematics(self.model, self._data, x[:NQ_LOCKED])
+            for leg, rows, (joint, _), way in zip(LEGS, held, self._forks, pull, strict=True):
+                # Crocoddyl has the one in the problem's axes and the other in the contact's.
+                plane = (way @ self._data.oMi[joint].rotation)[[0, 2]]
+                contacts[f"{leg}_{rows}"].reference = way if rows == "xyz" else plane
+        self._going = accompanying(self.model, self.xs, velocities)
 
     def hold(self, x: np.ndarray) -> None:
         """Take standing in a state ``(41,)`` as the last solution: a cold start."""

@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from wfbook.omni.base import Base
 from wfbook.omni.robot import WHEEL_RADIUS
-from wfbook.omni.wheels import constraint_matrix, wheel_command, wheel_velocities
+from wfbook.omni.wheels import constraint_matrix, moved, wheel_command, wheel_velocities
 
 _PLACE_GAIN, _LARGEST_HASTE = 3.0, 0.3
 """Of a wheel that is behind, 1/s, and the most that it is sped up, m/s."""
@@ -62,12 +62,17 @@ class Wheels:
 
     Args:
         base: that is commanded; its state goes on with every :meth:`advance`.
+
+    Attributes:
+        steering: ``(4,)`` angles commanded.
+        keep_places: whether wheels correct their places; without it they do as the base says.
     """
 
     def __init__(self, base: Base) -> None:
         self.base = base
         self.steering = base.steering.copy()
-        self._backward = base.backward.copy()
+        self.keep_places = True
+        self._speed = self._haste = np.zeros(4)
 
     def advance(self, wanted: np.ndarray, dt: float) -> None:
         """Move the commanded base on towards a wanted twist ``(3,)``."""
@@ -81,7 +86,7 @@ class Wheels:
             normals: ``(4, 3)`` of the ground there, likewise.
         """
         twist, positions = self.base.twist, self.base.positions
-        off = positions - places[:, :2]
+        off = self.keep_places * (positions - places[:, :2])
         moving = np.linalg.norm(wheel_velocities(twist, positions), axis=1).max() > _MOVING
         if moving:
             # Where the wheels are off course together, they are steered back.
@@ -93,11 +98,46 @@ class Wheels:
         else:
             self.steering = self.base.steering.copy()
         along = np.column_stack([np.cos(self.steering), np.sin(self.steering)])
-        speed = (constraint_matrix(self.steering, positions) @ self.base.twist)[4:]
-        speed = speed + np.clip(_PLACE_GAIN * (off * along).sum(axis=1), -_LARGEST_HASTE, _LARGEST_HASTE)
+        self._speed = (constraint_matrix(self.steering, positions) @ self.base.twist)[4:]
+        self._haste = np.clip(_PLACE_GAIN * (off * along).sum(axis=1), -_LARGEST_HASTE, _LARGEST_HASTE)
         # Uphill the way is longer than it looks from above.
         rise = -(normals[:, :2] * along).sum(axis=1) / normals[:, 2]
-        return speed * np.hypot(1.0, rise) / WHEEL_RADIUS
+        return (self._speed + self._haste) * np.hypot(1.0, rise) / WHEEL_RADIUS
+
+    def ahead(self, places: np.ndarray, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return where the wheels will be if the twist stays as it is, and the directions that they roll in.
+
+        Args:
+            places: ``(4, 3)`` of the wheels' middles now, in the base's axes.
+            times: ``(n,)`` from now on.
+
+        Returns:
+            ``(n, 4, 2)`` in the world, and ``(n, 4, 2)``.
+        """
+        poses = np.array([moved(self.base.state[:3], self.base.twist, t) for t in times])
+        cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+        back = np.array([[cos, sin], [-sin, cos]]).transpose(2, 0, 1)
+        along = np.column_stack([np.cos(self.steering), np.sin(self.steering)])
+        return poses[:, None, :2] + places[:, :2] @ back, along @ back
+
+    def velocities(self, places: np.ndarray, heights: np.ndarray, dt: float) -> np.ndarray:
+        """Return how the wheels go, relative to the base's axes that go along with the twist.
+
+        Haste is over as soon as the wheel is where it should be.
+
+        Args:
+            places: ``(4, 3)`` of the wheels' middles now, in the base's axes.
+            heights: ``(n + 2, 4)`` of their middles, one time step before now first.
+            dt: time step.
+
+        Returns:
+            ``(n, 4, 3)``.
+        """
+        along = np.column_stack([np.cos(self.steering), np.sin(self.steering)])
+        fade = np.exp(-_PLACE_GAIN * dt * np.arange(len(heights) - 2))
+        speeds = self._speed + fade[:, None] * self._haste
+        level = speeds[:, :, None] * along - wheel_velocities(self.base.twist, places[:, :2])
+        return np.dstack([level, (heights[2:] - heights[:-2]) / (2.0 * dt)])
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:

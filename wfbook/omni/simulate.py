@@ -8,8 +8,8 @@ is at rest.
 import os
 import time
 from collections import deque
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import astuple, dataclass, field
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -20,16 +20,36 @@ from wfbook.omni.base import Base
 from wfbook.omni.controller import FEEDBACK, ArmAlone, Command, OnWheels, WholeBody
 from wfbook.omni.costs import Weights
 from wfbook.omni.driving import Driving, holding_torques
+from wfbook.omni.habits import Habits
 from wfbook.omni.locked import MOTORS, Target, nominal_target
-from wfbook.omni.robot import DAMPING, NOMINAL_HEIGHT, NU, NV, STIFFNESS, Omni, contact_offsets, posture
+from wfbook.omni.machine import ON_LEGS, Mode
+from wfbook.omni.merits import driving_of, hand_of
+from wfbook.omni.on_legs import BRAKE, BRAKE_DAMPING
+from wfbook.omni.robot import (
+    DAMPING,
+    HAND_REACH,
+    NOMINAL_HEIGHT,
+    NU,
+    NV,
+    STIFFNESS,
+    WHEELS_V,
+    Omni,
+    contact_offsets,
+    posture,
+)
+from wfbook.omni.two_modes import Drive, Task, TwoModes, describe
 from wfbook.omni.waves import LENGTH, PEAK, RUN_UP, Ground, waves
 from wfbook.terrain import Terrain
+
+Targets = Callable[[float, np.ndarray], Target]
+"""From the time and the commanded base's pose ``(3,)`` to what the robot is asked for."""
 
 CONTROLLERS = ("ddp", "ik-level", "ik-true")
 """The paper's; and inverse kinematics of the arm that takes the trunk to be level, or knows its true pose."""
 
-FORMAT = 1
-TIMINGS = ("tick_ms_median", "tick_ms_p95", "plan_ms_median", "plan_ms_p95", "real_time_factor")
+FORMAT = 2
+TIMINGS = ("tick_ms_median", "tick_ms_p95", "tick_ms_p99", "plan_ms_p5", "plan_ms_median", "plan_ms_p95")
+TIMINGS += ("real_time_factor", "motion_s_max")
 """Metrics that differ from run to run of one seed; they are not in the run file."""
 
 _SETTLE = 0.5
@@ -38,6 +58,8 @@ _TILT, _CROUCH = 0.6, 0.25
 _LOST, _PROGRESS, _PATIENCE = 0.15, 0.01, 0.5
 """A hand that is further off than the first and has not come nearer by the second for the third is lost."""
 _FAILURES = 5
+_FELT = 15.0
+"""Force of the ground on a wheel that a sensor in its fork feels, N."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +77,10 @@ class Noise:
     spin: float = 2e-3
     angle: float = 1e-4
     rate: float = 1e-2
+
+    def times(self, factor: float) -> "Noise":
+        """Return so many times as much of it."""
+        return Noise(*(factor * deviation for deviation in astuple(self)))
 
     def disturb(
         self, qpos: np.ndarray, qvel: np.ndarray, rng: np.random.Generator
@@ -77,8 +103,12 @@ class OmniRun(Driving):
 
     Attributes:
         tau: ``(N, 23)`` torques that acted.
+        angles: ``(N, 23)`` joint angles that the motors were told to hold; those of wheels mean nothing.
         hand_rotation: ``(N, 3, 3)``.
         hand_ref: ``(N, 3)`` where the hand was to be.
+        hand_rotation_ref: ``(N, 3, 3)`` how it was to be turned.
+        mode: ``(N,)`` of :class:`wfbook.omni.machine.Mode`, the state machine's.
+        stance: ``(N, 4)`` bool, which wheels the controller takes to stand.
         events: what went wrong: time and text.
         metrics: figures of merit, see :func:`metrics_of`.
         meta: how it was run.
@@ -86,12 +116,16 @@ class OmniRun(Driving):
 
     LOGGED: ClassVar[tuple[str, ...]] = (
         *("t", "qpos", "qvel", "com", "hand", "p", "contact_force", "pose", "twist", "steering"),
-        *("tau", "hand_rotation", "hand_ref"),
+        *("tau", "angles", "hand_rotation", "hand_ref", "hand_rotation_ref", "mode", "stance"),
     )
 
     tau: np.ndarray
+    angles: np.ndarray
     hand_rotation: np.ndarray
     hand_ref: np.ndarray
+    hand_rotation_ref: np.ndarray
+    mode: np.ndarray
+    stance: np.ndarray
     events: list[tuple[float, str]] = field(default_factory=list)
     metrics: dict[str, Any] = field(default_factory=dict)
     meta: dict[str, Any] = field(default_factory=dict)
@@ -124,12 +158,16 @@ class OmniRun(Driving):
 
 
 def baseline_target() -> Target:
-    """Return the target of the arm alone on the waves: the same hand over a trunk that is carried lower.
+    """Return the target of the arm alone on the waves: a hand as high, over a trunk that is carried lower.
 
-    Legs that hold their posture lift the trunk by the waves' 0.2 m. From the nominal height the arm would run
-    into its joints' limits on every crest, and what is compared would be these.
+    Legs that hold their posture lift the trunk by the waves' 0.2 m and pitch it by 0.35 rad on seven waves.
+    From the nominal height the arm would run into its joints' limits on every crest; and with the hand where
+    Paper B's robot has it here it would on seven waves when the trunk pitches forward. Shoulder and hand are
+    then 0.34 m apart, elbow and fourth joint at their limits, the arm finds another way to fold and does not
+    come back: 60 mm (standard deviation) where with the hand 0.1 m further ahead it is 1 mm. What is compared
+    would be these limits.
     """
-    return nominal_target(height=NOMINAL_HEIGHT - 0.5 * PEAK)
+    return nominal_target(height=NOMINAL_HEIGHT - 0.5 * PEAK, hand_reach=HAND_REACH + 0.1)
 
 
 def run_waves(speed: float = 0.5, count: int = 5, **options: Any) -> OmniRun:
@@ -149,7 +187,7 @@ def run_waves(speed: float = 0.5, count: int = 5, **options: Any) -> OmniRun:
 
 def run(
     terrain: Terrain,
-    course: Sequence[tuple[float, Sequence[float]]],
+    course: Sequence[tuple[float, Sequence[float]] | Task],
     controller: str = "ddp",
     start: float = 0.0,
     delay: float = 0.0,
@@ -158,14 +196,19 @@ def run(
     payload: float = 0.0,
     trunk_mass_scale: float = 1.0,
     push: tuple[Sequence[float], float, float] | None = None,
-    target: Target | None = None,
+    target: Target | Targets | None = None,
     weights: Weights | None = None,
+    habits: Habits | None = None,
+    wheel_disturbance: Callable[[float], np.ndarray] | None = None,
+    progress: Callable[[float, float], None] | None = None,
+    rest: float = _REST,
 ) -> OmniRun:
     """Simulate a run.
 
     Args:
         terrain: to drive on; it must be level at height 0 around the start.
-        course: wanted twists one after the other: seconds and ``(3,)``.
+        course: wanted twists one after the other: seconds and ``(3,)``. Or tasks of :mod:`.two_modes`, among
+            which such pairs may be: then the mode state machine is in the loop.
         controller: one of :data:`CONTROLLERS`.
         start: x of the robot at first; it faces along x.
         delay: age of what the controller measures, s; it knows it.
@@ -174,32 +217,50 @@ def run(
         payload: mass in the hand that the controller does not know of, kg.
         trunk_mass_scale: of the trunk's true mass; the controller believes in 1.
         push: force ``(3,)`` at the trunk, when it begins, how long it lasts.
-        target: of hand and body; by default Paper B's.
+        target: of hand and body, or a function of the time and the commanded base's pose; by default
+            Paper B's.
         weights: of eq. 17.
+        habits: of the whole-body controller.
+        wheel_disturbance: from time to what is added to the wheels' commanded rates ``(4,)``; no controller
+            knows of it.
+        progress: called ten times a simulated second with the time and the end of the course.
+        rest: seconds after the course.
 
     Raises:
         ValueError: an unknown controller, or no course.
     """
     if controller not in CONTROLLERS:
         raise ValueError(f"controller: {controller!r} is none of {', '.join(CONTROLLERS)}")
-    if not course or not all(duration > 0.0 for duration, _ in course):
+    tasks = [Drive(*item) if isinstance(item, tuple | list) else item for item in course]
+    if not tasks or not all(task.duration > 0.0 for task in tasks if isinstance(task, Drive)):
         raise ValueError("course: needs twists that last")
+    timed = all(isinstance(task, Drive) for task in tasks)
+    if not timed and controller != "ddp":
+        raise ValueError(f"controller: {controller!r} can't step")
     began = time.perf_counter()
     target = nominal_target() if target is None else target
     robot = Omni(terrain, trunk_mass_scale, payload)
+    base, ground = Base(), Ground(terrain)
+    base.state[0] = start
+    targets, target = (target, target(0.0, base.state[:3])) if callable(target) else (None, target)
     qpos = posture()
     qpos[0], qpos[2], qpos[7 + MOTORS] = start, target.height, target.posture
     robot.reset(qpos)
-    base, ground = Base(), Ground(terrain)
-    base.state[0] = start
     known = delay, noise, np.random.default_rng(seed)
-    driver: OnWheels
-    if controller == "ddp":
-        driver = WholeBody(ground, target, base, delay, weights)
+    driver: OnWheels | TwoModes
+    if not timed:
+        driver = TwoModes(tasks, ground, target, base, delay, weights)
+    elif controller == "ddp":
+        driver = WholeBody(ground, target, base, delay, weights, habits=habits)
     else:
         driver = ArmAlone(ground, target, base, delay, level=controller == "ik-level")
     loop = _Loop(robot, driver, known, push)
-    loop.drive(course)
+    loop.targets, loop.wheel_disturbance, loop.progress = targets, wheel_disturbance, progress
+    loop.rest = rest
+    if timed:
+        loop.drive([(task.duration, task.twist) for task in tasks])
+    else:
+        loop.perform()
     columns = {name: np.array([sample[name] for sample in loop.samples]) for name in loop.samples[0]}
     meta = {
         "controller": controller,
@@ -207,13 +268,17 @@ def run(
         "noise": noise is not None,
         "seed": seed,
         "payload": payload,
-        "payload_estimate": driver.ocp.payload if isinstance(driver, WholeBody) else None,
+        "payload_estimate": None if isinstance(driver, ArmAlone) else driver.ocp.payload,
         "trunk_mass_scale": trunk_mass_scale,
-        "course": [[float(duration), [float(v) for v in twist]] for duration, twist in course],
+        "mass": float(robot.model.body_subtreemass[0]),
+        "course": [
+            [float(task.duration), [float(v) for v in task.twist]] if timed else describe(task)
+            for task in tasks
+        ],
     }
     result = OmniRun(**columns, terrain=terrain, events=loop.events, meta=meta)
     elapsed = time.perf_counter() - began
-    result.metrics.update(metrics_of(result, target) | loop.timings(elapsed))
+    result.metrics.update(metrics_of(result) | loop.timings(elapsed))
     return result
 
 
@@ -223,11 +288,15 @@ class _Loop:
     def __init__(
         self,
         robot: Omni,
-        driver: OnWheels,
+        driver: OnWheels | TwoModes,
         known: tuple[float, Noise | None, np.random.Generator],
         push: tuple[Sequence[float], float, float] | None,
     ) -> None:
         self.robot, self.driver, self.push = robot, driver, push
+        self.targets: Targets | None = None
+        self.wheel_disturbance: Callable[[float], np.ndarray] | None = None
+        self.progress: Callable[[float, float], None] | None = None
+        self.rest = _REST
         self.delay, self.noise, self.rng = known
         self.past = deque(maxlen=1 + round(1000 * self.delay))
         self.samples: list[dict[str, Any]] = []
@@ -237,31 +306,51 @@ class _Loop:
         self.tau = np.zeros(NU)
         self._astray = self._failures = 0
         self._nearest = np.inf
+        self._tasks = driver if isinstance(driver, TwoModes) else None
 
     def drive(self, course: Sequence[tuple[float, Sequence[float]]]) -> None:
         """Settle, follow the course, and stop; or stop when something goes wrong."""
         ends = np.cumsum([duration for duration, _ in course])
         twists = np.array([twist for _, twist in course], dtype=float)
-        stop, step, data = float(ends[-1]), -round(1000 * _SETTLE), self.robot.data
+
+        def wanted(t: float) -> np.ndarray:
+            leg = int(np.searchsorted(ends, t, side="right")) if t >= 0.0 else len(twists)
+            return twists[leg] if leg < len(twists) else np.zeros(3)
+
+        self._run(wanted, float(ends[-1]))
+
+    def perform(self) -> None:
+        """Settle, and let the driver carry out its tasks; or stop when something goes wrong."""
+        self._run(lambda t: np.zeros(3), np.inf)
+
+    def _run(self, wanted: Callable[[float], np.ndarray], stop: float) -> None:
+        """Simulate until a time, or until the driver is done or something goes wrong, and then the rest."""
+        step, data = -round(1000 * _SETTLE), self.robot.data
         while True:
             t = step / 1000
-            if self.events:
+            if self.events or (self._tasks is not None and self._tasks.done):
                 stop = min(stop, t)
             moving = bool(self.events) and np.abs(data.qvel[:6]).max() > _STILL
-            if t >= stop + (_LONGEST_REST if moving else _REST):
+            if t >= stop + (_LONGEST_REST if moving else self.rest):
                 return
-            leg = int(np.searchsorted(ends, t, side="right")) if t >= 0.0 else len(twists)
-            self._step(step, twists[leg] if leg < len(twists) else np.zeros(3))
+            if self.progress is not None and step % 100 == 0:
+                self.progress(t, stop + self.rest if np.isfinite(stop) else t)
+            self._step(step, wanted(t))
             step += 1
 
     def _step(self, step: int, wanted: np.ndarray) -> None:
         """Simulate a millisecond."""
         robot, t = self.robot, step / 1000
-        self.past.append((robot.data.qpos.copy(), robot.data.qvel.copy()))
+        felt = None if self._tasks is None else robot.contact_wrenches()[:, 2] > _FELT
+        self.past.append((robot.data.qpos.copy(), robot.data.qvel.copy(), felt))
         if step % round(1000 * FEEDBACK) == 0 and not self.events:
-            qpos, qvel = self.past[0]
+            qpos, qvel, felt = self.past[0]
             if self.noise is not None:
                 qpos, qvel = self.noise.disturb(qpos, qvel, self.rng)
+            if self.targets is not None:
+                self.driver.target = self.targets(t, self.driver.wheels.base.state[:3])
+            if self._tasks is not None:
+                self._tasks.felt, self._tasks.waiting = felt, t < 0.0
             began = time.perf_counter()
             self.command = self.driver.tick(qpos, qvel, wanted)
             self.times.append(time.perf_counter() - began)
@@ -273,8 +362,11 @@ class _Loop:
             force, begin, duration = self.push
             robot.push(np.asarray(force, float) * (begin <= t < begin + duration))
         command, data = self.command, robot.data
+        rates = command.rates.copy()
+        if self.wheel_disturbance is not None and not self.events:
+            rates[WHEELS_V - 6] += self.wheel_disturbance(t)
         self.tau = command.torques + command.stiffness * (command.angles - data.qpos[7:])
-        self.tau = self.tau + command.damping * (command.rates - data.qvel[6:])
+        self.tau = self.tau + command.damping * (rates - data.qvel[6:])
         robot.step(self.tau)
         if step >= 0 and step % 10 == 0:
             self.samples.append(self._sample(t))
@@ -295,7 +387,9 @@ class _Loop:
         self._astray += 1
         if off < max(_LOST, self._nearest - _PROGRESS):
             self._nearest, self._astray = off, 0
-        if isinstance(driver, WholeBody) and self._astray > _PATIENCE / FEEDBACK:
+        if self._tasks is not None and self._tasks.trouble is not None:
+            return self._tasks.trouble
+        if not isinstance(driver, ArmAlone) and self._astray > _PATIENCE / FEEDBACK:
             return f"the hand is {off:.2f} m from where it should be: out of reach"
         return None
 
@@ -306,7 +400,12 @@ class _Loop:
         """
         angles, fallen = np.array(self.robot.data.qpos[7:]), "fallen" in self.events[-1][1]
         torques = np.zeros(NU) if fallen else holding_torques(self.robot.data.qpos)
-        return Command(torques, angles, np.zeros(NU), (0.3 if fallen else 1.0) * STIFFNESS, DAMPING)
+        stiffness, damping = (0.3 if fallen else 1.0) * STIFFNESS, DAMPING.copy()
+        if self._tasks is not None:
+            if self._tasks.machine.mode in ON_LEGS:
+                stiffness[WHEELS_V - 6], damping[WHEELS_V - 6] = BRAKE, BRAKE_DAMPING
+            self._tasks.halt()
+        return Command(torques, angles, np.zeros(NU), stiffness, damping)
 
     def _hand_ref(self) -> np.ndarray:
         """Return where the hand should be in the world, ``(3,)``."""
@@ -320,6 +419,7 @@ class _Loop:
         robot, data, base = self.robot, self.robot.data, self.driver.wheels.base
         normals = self.driver.ground.below(robot.centres)[1]
         hand, rotation = robot.hand
+        yaw = pin.utils.rotate("z", base.state[2])
         return {
             "t": t,
             "qpos": data.qpos.copy(),
@@ -332,46 +432,44 @@ class _Loop:
             "twist": base.twist,
             "steering": self.driver.wheels.steering.copy(),
             "tau": np.clip(self.tau, -robot.efforts, robot.efforts),
+            "angles": self.command.angles.copy(),
             "hand_rotation": rotation,
             "hand_ref": self._hand_ref(),
+            "hand_rotation_ref": yaw @ self.driver.target.hand_rotation,
+            "mode": np.int8(Mode.WHEELED if self._tasks is None else self._tasks.machine.mode),
+            "stance": np.ones(4, bool) if self._tasks is None else self._tasks.standing.copy(),
         }
 
     def timings(self, elapsed: float) -> dict[str, float]:
-        """Return computing times: of every tick, of those that solve, and of all against the robot's."""
+        """Return computing times: of ticks, of those that solve, of whole motions; and robot's over ours."""
         ticks, every = 1e3 * np.array(self.times), 10
+        motions = [] if self._tasks is None else self._tasks.plans
         plans = ticks[::every]
         return {
             "tick_ms_median": float(np.median(ticks)),
             "tick_ms_p95": float(np.percentile(ticks, 95)),
+            "tick_ms_p99": float(np.percentile(ticks, 99)),
+            "plan_ms_p5": float(np.percentile(plans, 5)),
             "plan_ms_median": float(np.median(plans)),
             "plan_ms_p95": float(np.percentile(plans, 95)),
             "real_time_factor": float(len(self.times) * FEEDBACK / elapsed),
+            "motion_s_max": max((plan.solve_time for plan in motions), default=0.0),
         }
 
 
-def metrics_of(run: OmniRun, target: Target) -> dict[str, Any]:
-    """Return a run's figures of merit.
+def metrics_of(run: OmniRun) -> dict[str, Any]:
+    """Return a run's figures of merit: those of :mod:`.merits`, and how the run went.
 
-    ``hand_height_*`` are of the hand above the level ground at the start, in metres; ``hand_turn_max_rad``
-    is the largest angle between the hand and how it should be turned, the base's yaw aside;
-    ``rest_speed_m_s`` the fastest that the trunk moved in the last tenth of a second.
+    ``finished`` is a run in which nothing went wrong; ``rest_speed_m_s`` the fastest that the trunk moved in
+    the last tenth of a second.
     """
-    height = run.hand[:, 2]
-    yaws = run.pose[:, 2]
-    turns = [
-        np.linalg.norm(pin.log3((pin.utils.rotate("z", yaw) @ target.hand_rotation).T @ rotation))
-        for yaw, rotation in zip(yaws, run.hand_rotation, strict=True)
-    ]
-    error = run.hand - run.hand_ref
-    return {
-        "hand_height_mean_m": float(height.mean()),
-        "hand_height_std_m": float(height.std()),
-        "hand_height_max_error_m": float(np.abs(error[:, 2]).max()),
-        "hand_level_max_error_m": float(np.linalg.norm(error[:, :2], axis=1).max()),
-        "hand_turn_max_rad": float(max(turns)),
-        "distance_m": float(np.linalg.norm(run.qpos[-1, :2] - run.qpos[0, :2])),
-        "upright": not any("fallen" in what for _, what in run.events),
-        "finished": not run.events,
-        "rest_speed_m_s": float(np.abs(run.qvel[-10:, :3]).max()),
-        "events": [f"{when:.2f} s: {what}" for when, what in run.events],
-    }
+    return (
+        hand_of(run)
+        | driving_of(run, run.meta["mass"])
+        | {
+            "upright": not any("fallen" in what for _, what in run.events),
+            "finished": not run.events,
+            "rest_speed_m_s": float(np.abs(run.qvel[-10:, :3]).max()),
+            "events": [f"{when:.2f} s: {what}" for when, what in run.events],
+        }
+    )

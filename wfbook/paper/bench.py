@@ -9,6 +9,7 @@ import numpy as np
 
 from wfbook import archive, planner
 from wfbook.go1_dynamics import MOTORS
+from wfbook.paper.drives import Drive
 from wfbook.paper.options import Options
 from wfbook.paper.store import Store
 from wfbook.planner import Plan, Problem
@@ -190,6 +191,55 @@ class Bench:
             make,
             read,
             lambda found, path: archive.save(path, {}, {"meta": found}, _FORMAT),
+        )
+
+    def drive(self, name: str, label: str, seeds: int | None = None, **options: Any) -> list[Drive]:
+        """Return runs of an experiment of part II, one for each seed.
+
+        Args:
+            name: of the scenario.
+            label: of it, for the reader.
+            seeds: how many; those of the options without it.
+            options: of the scenario.
+        """
+        noisy = self.options.state == "estimated"
+        runs = []
+        for seed in range(self.options.seeds if seeds is None else min(seeds, self.options.seeds)):
+            definition = {"scenario": name, "delay": DELAY, "noise": noisy, "seed": seed} | options
+
+            def make(seed: int = seed) -> Drive:
+                from wfbook.omni.scenarios import SCENARIOS
+                from wfbook.omni.simulate import Noise
+
+                head = f"{label}: simulating, seed {seed}"
+                known = {"delay": DELAY, "noise": Noise() if noisy else None, "seed": seed}
+                progress = lambda now, end: self._say(f"{head}, {now:5.2f} of {end:.2f} s")  # noqa: E731
+                return Drive.of(SCENARIOS[name].run(**known, **options, progress=progress))
+
+            runs.append(
+                self.store.get("drive", definition, make, Drive.load, lambda run, path: run.save(path))
+            )
+        self.troubles += [
+            f"{label}: {run.metrics['events'][0]}, seed {run.meta['seed']}"
+            for run in runs
+            if not run.metrics["finished"]
+        ]
+        return runs
+
+    def solve(self, label: str) -> dict[str, Any]:
+        """Return how long the optimal control problem of part II takes (see :mod:`.solving`)."""
+
+        def make() -> dict[str, Any]:
+            from wfbook.paper import solving
+
+            self._say(f"{label}: solving")
+            return solving.measure()
+
+        def read(path: Path) -> dict[str, Any]:
+            return archive.load(path, "solution times", (), ("meta",), _FORMAT)["meta"]
+
+        return self.store.get(
+            "solve", {}, make, read, lambda found, path: archive.save(path, {}, {"meta": found}, _FORMAT)
         )
 
     @property

@@ -36,7 +36,7 @@ CACHE = "cache"
 def add_to(commands: Any) -> None:
     """Add the command's parser to the subparsers of the program's."""
     parser = commands.add_parser(
-        "paper", help="the paper's figures and numbers beside what comes out here", allow_abbrev=False
+        "paper", help="the papers' figures and numbers beside what comes out here", allow_abbrev=False
     )
     default = Options()
     parser.set_defaults(command=run)
@@ -74,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
         CommandError: wrong input, or interrupted with something found.
         KeyboardInterrupt: interrupted with nothing found.
     """
-    load("wfbook.paper.parts", "wfbook.simulate", "wfbook.view.paper")
+    load("wfbook.paper.parts", "wfbook.simulate", "wfbook.view.paper", "wfbook.view.paper_omni")
     given = _table2(arguments)
     from wfbook.paper.bench import Bench
     from wfbook.paper.parts import EXPERIMENTS
@@ -147,7 +147,7 @@ def _done(experiment: "Experiment", bench: Any) -> "Result":
 
 def _report(asked: "list[Experiment]", done: "dict[str, Result]", bench: Any) -> dict[str, Any]:
     """Return what ``paper.json`` holds, in JSON's types."""
-    from wfbook.quoted import PAPER_A
+    from wfbook.quoted import PAPER_A, PAPER_B
     from wfbook.table2.benchmark import machine
 
     entries = []
@@ -176,7 +176,7 @@ def _report(asked: "list[Experiment]", done: "dict[str, Result]", bench: Any) ->
             "machine": machine(),
             "options": bench.settings,
             "experiments": entries,
-            "unused": [asdict(said) for said in PAPER_A if said.unused],
+            "unused": [asdict(said) for said in PAPER_A + PAPER_B if said.unused],
         }
     )
 

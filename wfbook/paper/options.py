@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 NAMES = ("flat", "flat-friction", "ramp-down", "ramp-up", "stepping-stones", "speed", "transport", "table2")
+NAMES += ("omni-waves", "omni-fixed", "omni-combined", "omni-turn", "omni-squat", "omni-times")
 """Of the experiments that :mod:`wfbook.paper.parts` lists."""
 
 

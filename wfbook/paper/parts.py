@@ -1,11 +1,8 @@
-"""The list of experiments: what ``python -m wfbook paper`` does, in the papers' order.
-
-Part II will be experiments of the second paper's sections, appended here.
-"""
+"""The list of experiments: what ``python -m wfbook paper`` does, in the papers' order."""
 
 from functools import partial
 
-from wfbook.paper import gaits, speed, times, transport
+from wfbook.paper import gaits, hardware, level, solving, speed, times, transport, waves
 from wfbook.paper.record import Experiment
 
 
@@ -18,6 +15,12 @@ def _gait(name: str, figure: int, title: str, section: str, *more: str) -> Exper
         (f"fig{figure:02}.png",),
         tuple(f"fig{figure}.{key}" for key in more),
     )
+
+
+def _hand(key: str) -> tuple[str, ...]:
+    """Return the keys of a simulation's figures of the hand."""
+    angles = (f"{name}{end}" for name in ("roll", "pitch", "yaw") for end in ("", "_std"))
+    return tuple(f"{key}.{what}" for what in ("mean", "std", "max", *angles))
 
 
 _TABLE_II = ("1,1,5", "1,1,10", "1,2,5", "1,2,10", "3,1,5", "3,1,10", "3,2,5")
@@ -60,6 +63,62 @@ EXPERIMENTS = (
         (
             *("table2.short", "table2.long", *(f"table2.{row}" for row in _TABLE_II)),
             *("times.grow", "times.harder", "times.half_second"),
+        ),
+    ),
+    Experiment(
+        "omni-waves",
+        "The hand over waves",
+        "Paper B, Fig. 6",
+        waves.run,
+        ("omni-fig06.png",),
+        (
+            *(f"omni.{what}" for what in ("length", "peak", "height", "roll", "pitch", "yaw", "speed")),
+            *("waves.ik_mean", "waves.ik_std", "waves.ik_max", *_hand("waves"), "waves.calmer"),
+        ),
+    ),
+    Experiment(
+        "omni-fixed",
+        "The body in its place over disturbed wheels",
+        "Paper B, Fig. 7a",
+        level.fixed,
+        ("omni-fig07a.png",),
+        (*_hand("fixed"), "fixed.legs", "fixed.joints"),
+    ),
+    Experiment(
+        "omni-combined",
+        "Ways of driving",
+        "Paper B, Fig. 7b",
+        level.combined,
+        ("omni-fig07b.png",),
+        _hand("combined"),
+    ),
+    Experiment(
+        "omni-turn",
+        "A turn on the spot and back",
+        "Paper B, Figs. 8a, 9, 10",
+        hardware.turn,
+        ("omni-fig09.png", "omni-fig10.png"),
+        tuple(f"turn.{what}" for what in ("angle", "returns", "height", "drift", "yaw", "legs", "limit")),
+    ),
+    Experiment(
+        "omni-squat",
+        "Squat and stand up",
+        "Paper B, Fig. 8b",
+        hardware.squat,
+        ("omni-fig08b.png",),
+        ("squat.hand",),
+    ),
+    Experiment(
+        "omni-times",
+        "The robot's numbers and computing times",
+        "Paper B, Formulation, Results",
+        solving.run,
+        (),
+        (
+            *(f"omni.{what}_joints" for what in ("leg", "steering", "wheel", "arm")),
+            *(f"omni.{what}" for what in ("states", "nodes_cold", "precision", "cold_least", "cold_most")),
+            *(f"omni.{what}" for what in ("nodes_warm", "warm_least", "warm_most", "feedback")),
+            *("omni.stable_least", "omni.stable_most"),
         ),
     ),
 )

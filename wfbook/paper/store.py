@@ -22,6 +22,9 @@ from wfbook.terrain import Terrain
 T = TypeVar("T")
 
 _PACKAGES = ("clarabel", "cvxpy", "daqp", "mujoco", "numpy", "osqp", "pin", "pyscipopt", "scipy")
+_DRIVING = ("crocoddyl",)
+"""Likewise, of what drives and plans nothing."""
+
 _PLANNING = (
     *("archive.py", "centroidal.py", "friction.py", "leg_path.py", "modes.py", "planner", "polygon.py"),
     *("swing.py", "terrain.py"),
@@ -33,6 +36,7 @@ _TELLING = (
     "arguments.py",
     "book",
     "classroom",
+    "omni_command.py",
     "quoted.py",
     "report.py",
     "results.py",
@@ -119,6 +123,6 @@ def code_stamp(planning: bool) -> str:
     digest = hashlib.sha256(wfbook.__version__.encode())
     for path in sorted(sources):
         digest.update(str(path.relative_to(root.parent)).encode() + b"\0" + path.read_bytes())
-    versions = {name: metadata.version(name) for name in _PACKAGES}
+    versions = {name: metadata.version(name) for name in _PACKAGES + (() if planning else _DRIVING)}
     digest.update(json.dumps(versions, sort_keys=True).encode())
     return digest.hexdigest()

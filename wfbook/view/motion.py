@@ -107,16 +107,20 @@ def motion_of_standing(standing: Standing) -> Motion:
 
 
 def motion_of_driving(driving: Driving) -> Motion:
-    """Sample the robot of part II as it drives; what was planned is the way of the undisturbed base."""
+    """Sample the robot of part II as it drives; what was planned is the way of the undisturbed base.
+
+    Wheels that a controller lifts (:class:`wfbook.omni.simulate.OmniRun`) leave no prints.
+    """
     times = np.arange(driving.t[0], driving.t[-1] + 1e-9, 1.0 / FPS)
     at = np.clip(np.searchsorted(driving.t, times - 1e-9), 0, len(driving.t) - 1)
     com = driving.com[at]
     wheel = np.ones((len(at), len(LEGS)), int)
+    stance = getattr(driving, "stance", None)
     return Motion(
         start=float(times[0]),
         qpos=driving.qpos[at],
         end_effector=wheel,
-        modes=wheel,
+        modes=wheel if stance is None else np.where(stance[at], wheel, SWINGING),
         contact=driving.p[at],
         force=driving.contact_force[at],
         planned_com=np.column_stack([driving.pose[at, :2], com[:, 2]]),
