@@ -27,7 +27,7 @@ from ipywidgets.embed import dependency_state
 import wfbook
 from wfbook.__main__ import main
 from wfbook.book import chapters as book_chapters
-from wfbook.book import execute, reference
+from wfbook.book import docstrings, execute, reference
 from wfbook.book.build import BuildError, run_sphinx
 from wfbook.book.chapters import Chapter, chapters
 from wfbook.book.still import VIEW, drawn
@@ -340,6 +340,18 @@ def test_words_become_links(tmp_path):
 def test_a_fault_in_the_sources_is_told(tmp_path):
     with pytest.raises(BuildError, match=r"chapters/01_x\.md:3: WARNING"):
         paged(tmp_path, **{"01_x": "[nowhere](nowhere.md)"})
+
+
+def test_no_page_tells_where_it_was_built(book):
+    for name in pages_of(book):
+        assert str(PACKAGE.parent) not in text_of(book, name), name
+
+
+def test_signatures_are_python_without_the_folder_of_the_project():
+    path = f"PosixPath('{PACKAGE.parent}/assets/x.xml')"
+    given = f"(rows: list = <factory>, f=<function X.<lambda> at 0x7f>, model: Path = {path}, n: int = 3)"
+    signature, _ = docstrings._readable(None, "class", "x", None, {}, given, None)
+    assert signature == "(rows: list = ..., f=..., model: Path = 'assets/x.xml', n: int = 3)"
 
 
 def test_the_reference_has_every_module_once():
