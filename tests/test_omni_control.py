@@ -9,10 +9,12 @@ import pytest
 from wfbook.omni import simulate
 from wfbook.omni.base import Base
 from wfbook.omni.controller import FEEDBACK, WholeBody
+from wfbook.omni.habits import Habits
 from wfbook.omni.locked import locked_state, nominal_target
 from wfbook.omni.robot import HAND_RPY, NV, WHEEL_POSITIONS, Omni, posture
 from wfbook.omni.rolling import Axes, Wheels
 from wfbook.omni.simulate import CONTROLLERS, TIMINGS, Noise, OmniRun, run
+from wfbook.omni.two_modes import RollTo
 from wfbook.omni.waves import Ground, waves
 from wfbook.terrain import flat
 from wfbook.view import replay
@@ -178,6 +180,12 @@ def test_what_is_wrong_is_said():
         run(flat(), [(1.0, [0, 0, 0])], controller="magic")
     with pytest.raises(ValueError, match="course"):
         run(flat(), [])
+    still = [(1.0, [0, 0, 0])]
+    for name, value in (("delay", -0.01), ("payload", np.nan), ("trunk_mass_scale", 0.0), ("rest", np.inf)):
+        with pytest.raises(ValueError, match=f"{name}: {value} must be"):
+            run(flat(), still, **{name: value})
+    with pytest.raises(ValueError, match="course: with tasks besides twists"):
+        run(flat(), [RollTo(0.5)], habits=Habits())
     assert set(CONTROLLERS) == {"ddp", "ik-level", "ik-true"}
 
 

@@ -53,7 +53,9 @@ TIMINGS += ("real_time_factor", "motion_s_max")
 """Metrics that differ from run to run of one seed; they are not in the run file."""
 
 _SETTLE = 0.5
-_REST, _LONGEST_REST, _STILL = 2.0, 6.0, 0.02
+_REST, _LONGEST_REST = 2.0, 6.0
+_STILL, _STAYS_STILL = 0.02, 0.3
+"""Speed of a trunk that is at rest, and for how long it must have been: one that rocks turns round, too."""
 _TILT, _CROUCH = 0.6, 0.25
 _LOST, _PROGRESS, _PATIENCE = 0.15, 0.01, 0.5
 """A hand that is further off than the first and has not come nearer by the second for the third is lost."""
@@ -227,7 +229,7 @@ def run(
         rest: seconds after the course.
 
     Raises:
-        ValueError: an unknown controller, or no course.
+        ValueError: an unknown controller, no course, or an option out of its range or without effect.
     """
     if controller not in CONTROLLERS:
         raise ValueError(f"controller: {controller!r} is none of {', '.join(CONTROLLERS)}")
@@ -237,6 +239,13 @@ def run(
     timed = all(isinstance(task, Drive) for task in tasks)
     if not timed and controller != "ddp":
         raise ValueError(f"controller: {controller!r} can't step")
+    if not timed and (callable(target) or habits is not None):
+        raise ValueError("course: with tasks besides twists there is one target, and habits stay as they are")
+    for name, value, least in (("delay", delay, 0.0), ("payload", payload, 0.0), ("rest", rest, 0.0)):
+        if not least <= value < np.inf:
+            raise ValueError(f"{name}: {value!r} must be at least {least:g} and finite")
+    if not 0.0 < trunk_mass_scale < np.inf:
+        raise ValueError(f"trunk_mass_scale: {trunk_mass_scale!r} must be positive and finite")
     began = time.perf_counter()
     target = nominal_target() if target is None else target
     robot = Omni(terrain, trunk_mass_scale, payload)
@@ -325,12 +334,14 @@ class _Loop:
 
     def _run(self, wanted: Callable[[float], np.ndarray], stop: float) -> None:
         """Simulate until a time, or until the driver is done or something goes wrong, and then the rest."""
-        step, data = -round(1000 * _SETTLE), self.robot.data
+        step, data, moved = -round(1000 * _SETTLE), self.robot.data, -np.inf
         while True:
             t = step / 1000
             if self.events or (self._tasks is not None and self._tasks.done):
                 stop = min(stop, t)
-            moving = bool(self.events) and np.abs(data.qvel[:6]).max() > _STILL
+            if np.abs(data.qvel[:6]).max() > _STILL:
+                moved = t
+            moving = bool(self.events) and t < moved + _STAYS_STILL
             if t >= stop + (_LONGEST_REST if moving else self.rest):
                 return
             if self.progress is not None and step % 100 == 0:
