@@ -17,7 +17,7 @@ from wfbook.omni.machine import Mode
 from wfbook.omni.robot import Omni
 
 if TYPE_CHECKING:
-    from wfbook.omni.simulate import OmniRun
+    from wfbook.omni.runs import OmniRun
 
 ANGLES = ("roll", "pitch", "yaw")
 

@@ -1,56 +1,50 @@
-"""Chapter 12: the robot of paper B in MuJoCo under a controller, what it measures late and wrongly, its log.
+"""Chapter 12: the robot of paper B in MuJoCo under a controller, and what it measures late and wrongly.
 
 Falls, hands that do not get where they should and solutions that are not finite end a run early: they are
-noted in :attr:`OmniRun.events`, the wheels are braked, and legs and arm hold where they are, until the robot
-is at rest.
+noted in its events, the wheels are braked, and legs and arm hold where they are, until the robot is at rest.
 """
 
-import os
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from dataclasses import astuple, dataclass, field
-from typing import Any, ClassVar, Self
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from wfbook import archive
 from wfbook.omni.base import Base
 from wfbook.omni.controller import FEEDBACK, ArmAlone, Command, OnWheels, WholeBody
 from wfbook.omni.costs import Weights
-from wfbook.omni.driving import Driving, holding_torques
+from wfbook.omni.driving import holding_torques
 from wfbook.omni.habits import Habits
 from wfbook.omni.locked import MOTORS, Target, nominal_target
 from wfbook.omni.machine import ON_LEGS, Mode
 from wfbook.omni.merits import driving_of, hand_of
+from wfbook.omni.noise import Noise
 from wfbook.omni.on_legs import BRAKE, BRAKE_DAMPING
 from wfbook.omni.robot import (
     DAMPING,
     HAND_REACH,
     NOMINAL_HEIGHT,
     NU,
-    NV,
     STIFFNESS,
     WHEELS_V,
     Omni,
     contact_offsets,
     posture,
 )
+from wfbook.omni.runs import TIMINGS, OmniRun
 from wfbook.omni.two_modes import Drive, Task, TwoModes, describe
 from wfbook.omni.waves import LENGTH, PEAK, RUN_UP, Ground, waves
 from wfbook.terrain import Terrain
+
+__all__ = ["CONTROLLERS", "TIMINGS", "Noise", "OmniRun", "Targets", "baseline_target", "run", "run_waves"]
 
 Targets = Callable[[float, np.ndarray], Target]
 """From the time and the commanded base's pose ``(3,)`` to what the robot is asked for."""
 
 CONTROLLERS = ("ddp", "ik-level", "ik-true")
 """The paper's; and inverse kinematics of the arm that takes the trunk to be level, or knows its true pose."""
-
-FORMAT = 2
-TIMINGS = ("tick_ms_median", "tick_ms_p95", "tick_ms_p99", "plan_ms_p5", "plan_ms_median", "plan_ms_p95")
-TIMINGS += ("real_time_factor", "motion_s_max")
-"""Metrics that differ from run to run of one seed; they are not in the run file."""
 
 _SETTLE = 0.5
 _REST, _LONGEST_REST = 2.0, 6.0
@@ -62,101 +56,6 @@ _LOST, _PROGRESS, _PATIENCE = 0.15, 0.01, 0.5
 _FAILURES = 5
 _FELT = 15.0
 """Force of the ground on a wheel that a sensor in its fork feels, N."""
-
-
-@dataclass(frozen=True)
-class Noise:
-    """Standard deviations of what is measured, white from one tick to the next.
-
-    Attributes:
-        position, rotation, velocity, spin: of the trunk: m, rad, m/s, rad/s.
-        angle, rate: of the joints: rad, rad/s.
-    """
-
-    position: float = 5e-4
-    rotation: float = 5e-4
-    velocity: float = 5e-3
-    spin: float = 2e-3
-    angle: float = 1e-4
-    rate: float = 1e-2
-
-    def times(self, factor: float) -> "Noise":
-        """Return so many times as much of it."""
-        return Noise(*(factor * deviation for deviation in astuple(self)))
-
-    def disturb(
-        self, qpos: np.ndarray, qvel: np.ndarray, rng: np.random.Generator
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Return a state ``(30,)``, ``(29,)`` as it is measured."""
-        qpos, qvel = qpos.copy(), qvel.copy()
-        qpos[:3] += self.position * rng.standard_normal(3)
-        turned = pin.Quaternion(*qpos[3:7]) * pin.Quaternion(pin.exp3(self.rotation * rng.standard_normal(3)))
-        qpos[3:7] = turned.coeffs()[[3, 0, 1, 2]]
-        qpos[7:] += self.angle * rng.standard_normal(NU)
-        qvel[:3] += self.velocity * rng.standard_normal(3)
-        qvel[3:6] += self.spin * rng.standard_normal(3)
-        qvel[6:] += self.rate * rng.standard_normal(NV - 6)
-        return qpos, qvel
-
-
-@dataclass(frozen=True)
-class OmniRun(Driving):
-    """A run; besides what :class:`wfbook.omni.driving.Driving` has, samples ``N`` every 10 ms.
-
-    Attributes:
-        tau: ``(N, 23)`` torques that acted.
-        angles: ``(N, 23)`` joint angles that the motors were told to hold; those of wheels mean nothing.
-        hand_rotation: ``(N, 3, 3)``.
-        hand_ref: ``(N, 3)`` where the hand was to be.
-        hand_rotation_ref: ``(N, 3, 3)`` how it was to be turned.
-        mode: ``(N,)`` of :class:`wfbook.omni.machine.Mode`, the state machine's.
-        stance: ``(N, 4)`` bool, which wheels the controller takes to stand.
-        events: what went wrong: time and text.
-        metrics: figures of merit, see :func:`metrics_of`.
-        meta: how it was run.
-    """
-
-    LOGGED: ClassVar[tuple[str, ...]] = (
-        *("t", "qpos", "qvel", "com", "hand", "p", "contact_force", "pose", "twist", "steering"),
-        *("tau", "angles", "hand_rotation", "hand_ref", "hand_rotation_ref", "mode", "stance"),
-    )
-
-    tau: np.ndarray
-    angles: np.ndarray
-    hand_rotation: np.ndarray
-    hand_ref: np.ndarray
-    hand_rotation_ref: np.ndarray
-    mode: np.ndarray
-    stance: np.ndarray
-    events: list[tuple[float, str]] = field(default_factory=list)
-    metrics: dict[str, Any] = field(default_factory=dict)
-    meta: dict[str, Any] = field(default_factory=dict)
-
-    def save(self, path: str | os.PathLike) -> None:
-        """Write the run file, whole or not at all.
-
-        Raises:
-            OSError: the file can't be written.
-        """
-        metrics = {name: value for name, value in self.metrics.items() if name not in TIMINGS}
-        texts = {"metrics": metrics, "meta": self.meta, "events": self.events}
-        arrays = {name: getattr(self, name) for name in self.LOGGED}
-        archive.save(path, arrays, texts | {"terrain": self.terrain.to_dict()}, FORMAT)
-
-    @classmethod
-    def load(cls, path: str | os.PathLike) -> Self:
-        """Read a run file.
-
-        Raises:
-            ValueError: the file is no such run, is truncated, or is of another version.
-            OSError: the file can't be read.
-        """
-        texts = ("metrics", "meta", "events", "terrain")
-        data = archive.load(path, "run of part II", cls.LOGGED, texts, FORMAT)
-        data["metrics"] = dict.fromkeys(TIMINGS) | data["metrics"]
-        data["events"] = [(when, what) for when, what in data["events"]]
-        data["terrain"] = Terrain.from_dict(data["terrain"], source=f"{path}: terrain")
-        return cls(**data)
 
 
 def baseline_target() -> Target:

@@ -14,7 +14,7 @@ from wfbook.view.figures import draw_gait
 from wfbook.view.style import HAND, INK, LIMIT, MODE_COLOURS, PLANNED, SWINGING, Picture, tidy
 
 if TYPE_CHECKING:
-    from wfbook.omni.simulate import OmniRun
+    from wfbook.omni.runs import OmniRun
 
 _ROLLS = 0.02
 """Speed over the ground, m/s, below which a wheel stands."""

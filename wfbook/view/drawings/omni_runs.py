@@ -27,7 +27,7 @@ from wfbook.view.style import (
 )
 
 if TYPE_CHECKING:
-    from wfbook.omni.simulate import OmniRun
+    from wfbook.omni.runs import OmniRun
     from wfbook.terrain import Terrain
 
 STYLES = ("-", "--", "-.", ":", (0, (1, 3)), (0, (6, 2, 1, 2, 1, 2)))
