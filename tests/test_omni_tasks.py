@@ -88,7 +88,7 @@ def test_a_guess_that_lies_is_better_than_a_fall():
         ocp = reaching(nodes=40)
         begin(ocp, REST, start)
         costs[start] = attempt(ocp, REST, 15).costs[-1]
-    assert costs["no torque"] < 10.0 and costs["fall"] > 1e6
+    assert costs["no torque"] < 10.0 and costs["fall"] > 100.0 * costs["no torque"]
 
 
 def test_a_path_spares_the_motors(reached):

@@ -234,10 +234,17 @@ def test_modes_and_swings_are_drawn_as_long_as_they_last(run):
     assert covered == pytest.approx(run.t[-1] - run.t[0])
 
 
-def test_predictions_and_clocks_are_drawn_as_given(run):
-    predicted = np.sin(run.t)
-    picture = drawings.levers(run, predicted)
-    np.testing.assert_allclose(lines(picture, "predicted")[0].get_ydata(), 1e3 * predicted)
+def test_what_a_tilt_makes_of_the_hands_height_is_a_lever(run):
+    qpos, angles = run.qpos.copy(), np.linspace(-0.3, 0.3, len(run.t))
+    qpos[:, 3:7] = np.column_stack([np.cos(angles / 2), 0 * angles, np.sin(angles / 2), 0 * angles])
+    pitched = replace(run, qpos=qpos, pose=np.zeros_like(run.pose))
+    away = run.hand_ref - qpos[:, :3]
+    expected = -away[:, 0] * np.sin(angles) + away[:, 2] * (np.cos(angles) - 1.0)
+    drawn = lines(drawings.levers(pitched), "from the tilt")[0].get_ydata()
+    np.testing.assert_allclose(drawn, 1e3 * expected, atol=1e-9)
+
+
+def test_clocks_are_drawn_as_given():
     t = np.arange(100)
     clocks = drawings.clocks(t, {"slow": t // 20, "mid": t // 2, "fast": t}, t[t % 20 == 0])
     assert len(lines(clocks, "plan")) == 5

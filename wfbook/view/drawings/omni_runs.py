@@ -156,12 +156,13 @@ def shares(runs: "Mapping[str, OmniRun]") -> Picture:
     return figure
 
 
-def levers(run: "OmniRun", predicted: np.ndarray) -> Picture:
-    """Draw the error of the hand's height beside what somebody predicts of it.
+def levers(run: "OmniRun") -> Picture:
+    """Draw the error of the hand's height beside what the trunk's tilt alone makes of it.
+
+    The hand is put where it should be in axes that are turned with the trunk.
 
     Args:
-        run: along x.
-        predicted: ``(N,)``.
+        run: of an arm that takes its trunk to be level.
     """
     figure = Picture(9.0, 2.8)
     axes = figure.add_subplot()
@@ -169,11 +170,20 @@ def levers(run: "OmniRun", predicted: np.ndarray) -> Picture:
     way, error = run.pose[:, 0], run.hand[:, 2] - run.hand_ref[:, 2]
     axes.plot(way, 1e3 * error, color=HAND, linewidth=3.5, alpha=0.45, label="measured", gid="measured")
     look = {"color": PLANNED, "linewidth": 1.5, "linestyle": "--"}
-    axes.plot(way, 1e3 * predicted, label="predicted", gid="predicted", **look)
+    axes.plot(way, 1e3 * _tilted(run), label="from the tilt", gid="from the tilt", **look)
     axes.set_xlabel("way of the commanded base (m)")
     axes.set_ylabel("hand too high (mm)")
     axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
     return figure
+
+
+def _tilted(run: "OmniRun") -> np.ndarray:
+    """Return how much higher than it should be a hand is that tilts with the trunk, ``(N,)``."""
+    rows = zip(run.hand_ref - run.qpos[:, :3], run.qpos[:, 3:7], run.pose[:, 2], strict=True)
+    level = (
+        (away, pin.Quaternion(*q).toRotationMatrix(), pin.utils.rotate("z", -yaw)) for away, q, yaw in rows
+    )
+    return np.array([(R_wb @ back @ away - away)[2] for away, R_wb, back in level])
 
 
 def hand_turns(run: "OmniRun") -> np.ndarray:
