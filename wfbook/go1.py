@@ -283,20 +283,24 @@ def convex_bodies(terrain: "Terrain") -> list[list[int]]:
     and is slowed. Over a crest, regions of the same friction are one convex body, and the crest is its edge.
     In a hollow they can't be, and need not: there a wheel leaves the one as it touches the other.
     """
-    bodies = [[i] for i in range(len(terrain.regions))]
-    boxes = [(r.vertices[:, :2].min(axis=0), r.vertices[:, :2].max(axis=0)) for r in terrain.regions]
+    regions = terrain.regions
+    bodies = [[i] for i in range(len(regions))]
+    # In two dimensions scipy calls the area volume.
+    areas = [ConvexHull(r.vertices[:, :2]).volume for r in regions]
+    low = np.array([r.vertices[:, :2].min(axis=0) for r in regions]) - _SEAM
+    high = np.array([r.vertices[:, :2].max(axis=0) for r in regions])
     joined = True
     while joined:
         joined = False
         first = 0
         while first < len(bodies):
-            for other in range(first + 1, len(bodies)):
-                (low, high), (low_other, high_other) = boxes[first], boxes[other]
-                apart = (low > high_other + _SEAM).any() or (low_other > high + _SEAM).any()
-                if not apart and _convex(terrain, bodies[first], bodies[other]):
+            apart = (low[first] > high) | (low > high[first])
+            for other in np.flatnonzero(~apart.any(axis=1)):
+                if other > first and _convex(terrain, bodies[first] + bodies[other], areas):
                     bodies[first] += bodies.pop(other)
-                    boxes[first] = np.minimum(low, low_other), np.maximum(high, high_other)
-                    boxes.pop(other)
+                    low[first] = np.minimum(low[first], low[other])
+                    high[first] = np.maximum(high[first], high[other])
+                    low, high = np.delete(low, other, axis=0), np.delete(high, other, axis=0)
                     joined = True
                     break
             else:
@@ -304,16 +308,16 @@ def convex_bodies(terrain: "Terrain") -> list[list[int]]:
     return bodies
 
 
-def _convex(terrain: "Terrain", a: list[int], b: list[int]) -> bool:
-    """Whether the union of two sets of regions is the upper side of a convex body of one friction."""
-    regions = [terrain.regions[i] for i in a + b]
+def _convex(terrain: "Terrain", indices: list[int], areas: list[float]) -> bool:
+    """Whether the union of regions is the upper side of a convex body of one friction; ``areas`` are all."""
+    regions = [terrain.regions[i] for i in indices]
     if len({(r.mu_foot, r.mu_wheel_lateral, r.rolling_resistance) for r in regions}) > 1:
         return False
     corners = np.vstack([r.vertices for r in regions])
-    above = max(((corners - r.vertices[0]) @ r.normal).max() for r in regions)
-    # In two dimensions scipy calls the area volume.
-    areas = [ConvexHull(r.vertices[:, :2]).volume for r in regions]
-    return above < _SEAM and abs(ConvexHull(corners[:, :2]).volume - sum(areas)) < _SEAM * sum(areas)
+    if max(((corners - r.vertices[0]) @ r.normal).max() for r in regions) >= _SEAM:
+        return False
+    area = sum(areas[i] for i in indices)
+    return abs(ConvexHull(corners[:, :2]).volume - area) < _SEAM * area
 
 
 def add_ground(spec: mujoco.MjSpec, terrain: "Terrain", wheel_radius: float) -> None:
