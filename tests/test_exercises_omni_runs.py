@@ -26,16 +26,19 @@ class Ended:
         self.events = [] if finished else [(0.9, "fallen: the trunk is tipped over")]
 
 
-RIGHT = {"4 ms": True, "20 ms": False, "20 ms, predicted": True}
+LOADED = "12 ms and 1.5 kg, predicted"
+RIGHT = {"20 ms": False, "20 ms, predicted": True, LOADED: True}
 
 
 def test_late():
     known = {trip: Ended(RIGHT[name]) for name, trip in check.LATE.items()}
     assert "Right" in check.late(RIGHT, known)
-    refused("with 4 ms the robot gets over", check.late, RIGHT | {"4 ms": False}, known)
+    refused("1.5 kg, predicted the robot gets over", check.late, RIGHT | {LOADED: False}, known)
     refused("with 20 ms the robot does not: fallen", check.late, RIGHT | {"20 ms": True}, known)
-    refused("predicted the robot gets over", check.late, RIGHT | {"20 ms, predicted": False}, known)
-    refused("an entry for each", check.late, {"4 ms": True}, known)
+    refused(
+        "with 20 ms, predicted the robot gets over", check.late, RIGHT | {"20 ms, predicted": False}, known
+    )
+    refused("an entry for each", check.late, {"20 ms": False}, known)
     refused("neither True nor False", check.late, RIGHT | {"20 ms": "no"}, known)
 
 

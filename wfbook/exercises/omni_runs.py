@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from wfbook.omni.simulate import OmniRun
 
 LATE = {
-    "4 ms": Trip(delay_ms=4.0, habits=Habits(predicts=False)),
     "20 ms": Trip(delay_ms=20.0, habits=Habits(predicts=False)),
     "20 ms, predicted": Trip(delay_ms=20.0),
+    "12 ms and 1.5 kg, predicted": Trip(delay_ms=12.0, payload=1.5),
 }
 """Trips of :func:`late`, by what is said of them."""
 

@@ -180,10 +180,10 @@ def combined(each: float = 3.0, **options: Any) -> OmniRun:
     return on_the_floor([(each, twist) for twist in ([0.5, 0, 0], [0, 0, SPIN], [0, 0.5, 0])], **options)
 
 
-def turn(angle: float = TURN, rate: float = TURN_RATE, **options: Any) -> OmniRun:
-    """Turn on the spot and back, the hand held where it is in the world."""
+def turn(angle: float = TURN, rate: float = TURN_RATE, wait: float = TURN_WAIT, **options: Any) -> OmniRun:
+    """Turn on the spot and back, the hand held where it is in the world; wait between."""
     lasts, there, back = angle / rate, np.array([0.0, 0.0, rate]), np.array([0.0, 0.0, -rate])
-    course = [(_steering_time(there) + lasts, there), (TURN_WAIT, np.zeros(3)), (lasts, back)]
+    course = [(_steering_time(there) + lasts, there), (wait, np.zeros(3)), (lasts, back)]
     return on_the_floor(course, target=held_in_the_world(), **options)
 
 
