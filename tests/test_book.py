@@ -319,7 +319,7 @@ def test_words_become_links(tmp_path):
         tmp_path,
         **{
             "00_over": "$$a \\tag{A 1}$$\n\nSee eq. 1, eq. 2 and chapters 1 and 9; not eq. 5 nor chapter 7.",
-            "01_body": "$$a \\tag{A 1}$$\n\n$$b \\tag{A 2}$$\n\nEqs 1 to 2. `eq. 1` is code.",
+            "01_body": "$$a \\tag{A 1}$$\n\n$$b \\tag{A 2}$$\n\nEqs 1 to 2. `eq. 1` is code. (B 1), not B 1.",
             "09_wheels": "$$c \\tag{B 1}$$\n\n**Eq. 1** is B's. Paper A, eq. 2 is not; nor eq. 1.\n\nEq. 1",
         },
     )
@@ -328,7 +328,8 @@ def test_words_become_links(tmp_path):
         ("01_body.html#eq-a-2", "eq. 2"),
         ("01_body.html", "1"),
     ]
-    assert links(pages["01_body"]) == [("#eq-a-1", "1"), ("#eq-a-2", "2")]
+    tagged = ("09_wheels.html#eq-b-1", "B 1")
+    assert links(pages["01_body"]) == [("#eq-a-1", "1"), ("#eq-a-2", "2"), tagged]
     assert links(pages["09_wheels"]) == [
         ("#eq-b-1", "Eq. 1"),
         ("01_body.html#eq-a-2", "Paper A, eq. 2"),

@@ -1,9 +1,9 @@
 """Sphinx extension: plain words become links.
 
-Authors write what they would write on paper: "eq. 8", "eqs 12 to 15", "Paper B, eq. 7", "chapter 3", and
-names of the library in code, ``wfbook.swing.quintic_basis``. Without a paper an equation is one of the paper
-that the paragraph named last, or that the page is about: A in part I and B in part II. What there is no page
-for stays text.
+Authors write what they would write on paper: "eq. 8", "eqs 12 to 15", "Paper B, eq. 7", "(B 7)",
+"chapter 3", and names of the library in code, ``wfbook.swing.quintic_basis``. Without a paper an equation is
+one of the paper that the paragraph named last, or that the page is about: A in part I and B in part II. What
+there is no page for stays text.
 """
 
 import ast
@@ -29,6 +29,7 @@ _EQUATIONS = re.compile(
     r"(?:\bPaper (?P<paper>[AB]), (?:after )?)?"
     rf"\b(?:[Ee]q\. (?P<one>\d+)|[Ee]quation (?P<spelt>\d+)|(?:[Ee]qs|[Ee]quations) (?P<many>\d+{_MORE}))"
 )
+_TAGS = re.compile(r"(?<=\()(?P<paper>[AB]) (?P<one>\d+)(?=\))")
 _CHAPTERS = re.compile(rf"\b[Cc]hapters? (?P<numbers>\d+{_MORE})")
 _NUMBER = re.compile(r"\d+")
 _NAME = re.compile(r"wfbook(?:\.\w+)+(?=(?:\(\))?$)")
@@ -58,6 +59,8 @@ def _link(app: Sphinx, document: nodes.document, page: str) -> None:
         for match in _EQUATIONS.finditer(text):
             named[block] = paper = match["paper"] or named.get(block, home)
             yield from _links(match, ("one", "spelt", "many"), lambda n, p=paper: place_of((p, n)))
+        for match in _TAGS.finditer(text):
+            yield from _links(match, ("one",), lambda n, p=match["paper"]: place_of((p, n)))
         for match in _CHAPTERS.finditer(text):
             yield from _links(match, ("numbers",), chapter_of)
 
