@@ -70,16 +70,19 @@ def test_a_student_copy_holds_no_solution(chapter):
 
 @every_chapter
 def test_a_student_copy_needs_no_answer_before_the_next_exercise(chapter):
-    """Cells between exercises use nothing that only a solution defines."""
+    """Cells between exercises use nothing that only a solution or a check defines: grading runs neither."""
     sources = student_sources(chapter)
     for position, cell in enumerate(chapter.cells):
         if position in chapter.setup:
             assert sources[position] == cell.source
-    known = set().union(*(bound(chapter.cells[p].source) for p in chapter.setup))
+    given = set()
     for exercise in chapter.exercises:
-        given = set().union(*(bound(chapter.cells[p].source) for p in exercise.answers)) - known
-        for position in chapter.setup:
-            assert not given & names_used(chapter.cells[position].source), f"cell {position}"
+        given |= set().union(*(bound(chapter.cells[p].source) for p in (*exercise.answers, exercise.check)))
+    known = set()
+    for position in sorted(chapter.setup):
+        source = chapter.cells[position].source
+        assert not (given - known) & names_used(source), f"cell {position}"
+        known |= bound(source)
 
 
 def names_used(source):
